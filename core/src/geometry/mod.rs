@@ -1,0 +1,10 @@
+//! Where the cameras are and how they see: lenses, the pair, the mount on the vehicle.
+//!
+//! Camera frame: x right, y down, z forward. Vehicle frame: x forward, y left, z up, origin on the ground below the left
+//! camera (REP-103). Metres and radians.
+
+mod calibration;
+mod mount;
+
+pub use calibration::{CameraModel, Distortion, RawPair, Rectification, RectifiedPair, StereoCalibration};
+pub use mount::{Mount, VehicleFrame};

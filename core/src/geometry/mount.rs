@@ -1,0 +1,100 @@
+//! How the left camera sits on the vehicle.
+
+use crate::error::ConfigError;
+
+/// Height and tilt of the left camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Mount {
+    /// Height of the left camera above the ground, metres; `None` if not known.
+    pub height_m: Option<f32>,
+    /// Tilt of the optical axis below the horizon, degrees.
+    pub pitch_down_deg: f32,
+    /// Roll about the optical axis, degrees; positive if the camera leans to the right.
+    pub roll_deg: f32,
+}
+
+impl Default for Mount {
+    fn default() -> Self {
+        Self { height_m: None, pitch_down_deg: 0.0, roll_deg: 0.0 }
+    }
+}
+
+impl Mount {
+    /// Height that stands in where it is not known, metres: about that of the cameras on the LAGR robot.
+    pub const ASSUMED_HEIGHT_M: f32 = 1.0;
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first value that cannot be used, named `mount.*`.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        if let Some(height_m) = self.height_m {
+            ConfigError::check("mount.height_m", height_m, 0.02, 20.0)?;
+        }
+        ConfigError::check("mount.pitch_down_deg", self.pitch_down_deg, -60.0, 89.0)?;
+        ConfigError::check("mount.roll_deg", self.roll_deg, -60.0, 60.0)
+    }
+}
+
+/// Turns points of the left rectified camera's frame into the vehicle frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VehicleFrame {
+    /// Rows: the vehicle's x, y and z axes, seen in the camera frame.
+    rows: [[f32; 3]; 3],
+    height_m: f32,
+}
+
+impl VehicleFrame {
+    /// The frame that `mount` describes.
+    ///
+    /// # Errors
+    /// As [`Mount::check`].
+    pub fn new(mount: &Mount) -> Result<Self, ConfigError> {
+        mount.check()?;
+        let (sin_pitch, cos_pitch) = libm::sincosf(mount.pitch_down_deg.to_radians());
+        let (sin_roll, cos_roll) = libm::sincosf(mount.roll_deg.to_radians());
+        // A camera that leans to the right sees the world turned to the left: undo the roll about z, then the pitch about x,
+        // then exchange the axes (camera z forward -> vehicle x, camera x right -> vehicle -y, camera y down -> vehicle -z).
+        let right = [cos_roll, -sin_roll, 0.0];
+        let down = [sin_roll, cos_roll, 0.0];
+        let rows = [
+            [-sin_pitch * down[0], -sin_pitch * down[1], cos_pitch],
+            [-right[0], -right[1], 0.0],
+            [-cos_pitch * down[0], -cos_pitch * down[1], -sin_pitch],
+        ];
+        Ok(Self { rows, height_m: mount.height_m.unwrap_or(Mount::ASSUMED_HEIGHT_M) })
+    }
+
+    /// Height of the camera above the origin of the vehicle frame, metres.
+    pub const fn camera_height_m(&self) -> f32 {
+        self.height_m
+    }
+
+    /// The vehicle's x, y and z axes, seen in the camera frame.
+    pub const fn rows(&self) -> &[[f32; 3]; 3] {
+        &self.rows
+    }
+
+    /// Turns a direction.
+    pub fn direction(&self, camera: [f32; 3]) -> [f32; 3] {
+        let r = &self.rows;
+        [dot(r[0], camera), dot(r[1], camera), dot(r[2], camera)]
+    }
+
+    /// Turns and moves a point.
+    pub fn point(&self, camera_m: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = self.direction(camera_m);
+        [x, y, z + self.height_m]
+    }
+
+    /// Turns a direction of the vehicle frame back into the camera frame.
+    pub fn to_camera(&self, v: [f32; 3]) -> [f32; 3] {
+        let r = &self.rows;
+        core::array::from_fn(|i| r[0][i] * v[0] + r[1][i] * v[1] + r[2][i] * v[2])
+    }
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

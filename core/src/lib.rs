@@ -1,0 +1,30 @@
+//! Stereo obstacle detection for robots with small computers.
+//!
+//! The core takes pictures from a pair of cameras and tells where a ground robot cannot drive. It knows no file, clock,
+//! thread or device, allocates nothing and keeps all of its state in buffers whose size the compiler knows.
+//!
+//! ```text
+//! raw pair ──> rectify ──> matching ──> validate ──> surfaces ──> planes ──┬──> ground ────┐
+//!              rows in     disparity    small        32 x 32      a normal │               ├──> map ──> wire
+//!              line        + reasons    surfaces     tiles        each     └──> obstacles ─┘    cells   CAN payloads
+//! ```
+//!
+//! The method is that of *Working toward a better vision-based obstacle detection method*, written for the DARPA LAGR
+//! programme; "the paper" in this documentation.
+#![no_std]
+#![deny(unsafe_code)]
+
+pub mod disparity;
+pub mod error;
+pub mod geometry;
+pub mod ground;
+pub mod health;
+pub mod map;
+pub mod matching;
+pub mod obstacles;
+pub mod picture;
+pub mod planes;
+pub mod rectify;
+pub mod surfaces;
+pub mod validate;
+pub mod wire;
