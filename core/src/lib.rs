@@ -14,6 +14,7 @@
 #![no_std]
 #![deny(unsafe_code)]
 
+pub mod detector;
 pub mod disparity;
 pub mod error;
 pub mod geometry;
@@ -25,6 +26,7 @@ pub mod obstacles;
 pub mod picture;
 pub mod planes;
 pub mod rectify;
+pub mod settings;
 pub mod surfaces;
 pub mod validate;
 pub mod wire;

@@ -27,3 +27,24 @@ impl GroundPlane {
         self.normal[0] * p[0] + self.normal[1] * p[1] + self.normal[2] * p[2] - self.offset_m
     }
 }
+
+/// Settings of the ground plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct GroundSettings {
+    /// Largest tilt against the vehicle's horizontal, degrees.
+    pub max_tilt_deg: f32,
+    /// Largest difference between the height of the camera above the plane and that of the mount, metres, where the
+    /// height of the mount is known.
+    pub height_tolerance_m: f32,
+    /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
+    pub min_support_permille: f32,
+    /// Frames for which the last plane is held when a frame has none.
+    pub hold_frames: u16,
+}
+
+impl Default for GroundSettings {
+    fn default() -> Self {
+        Self { max_tilt_deg: 20.0, height_tolerance_m: 0.5, min_support_permille: 5.0, hold_frames: 10 }
+    }
+}
