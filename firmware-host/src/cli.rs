@@ -1,0 +1,248 @@
+//! The command line.
+
+use std::{num::ParseIntError, ops::Range, path::PathBuf, str::FromStr};
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Stereo obstacle detection: pictures from two cameras in, obstacle cells on a CAN bus out.
+#[derive(Debug, Parser)]
+#[command(version, about, long_about = None, after_long_help = AFTER_HELP, after_help = "With no command, `fencepost demo` runs. `fencepost --help` shows examples.")]
+pub struct Cli {
+    /// What to do; `demo` if left out.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Say nothing but warnings and errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more of what is done.
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+}
+
+const AFTER_HELP: &str = "\
+Examples:
+  fencepost                                    run the demo: a rendered scene, written to out/demo/
+  fencepost check ~/recordings/garden          what is in a recording, how far and how near it can see
+  fencepost replay ~/recordings/garden --out out/garden
+                                               detect obstacles in every pair, write tables, pictures,
+                                               a CAN log and report.html
+  fencepost replay garden --out out --frames 100..200 --write cells,can
+                                               only frames 100 to 199, only the tables and the CAN log
+  fencepost can decode out/garden/can.log      the messages of a CAN log as text
+
+A recording is a folder in the layout of KITTI odometry (image_0/, image_1/, calib.txt, times.txt; rectified)
+or of EuRoC ASL (mav0/cam0/, mav0/cam1/; raw). A file mount.json beside it says how high and how far tilted
+the left camera is: {\"height_m\": 0.9, \"pitch_down_deg\": 15.0, \"roll_deg\": 0.0}
+
+Exit status:
+  0  everything worked
+  1  the work failed or the input is bad: a recording, a picture, a calibration, a CAN log, a full disk
+  2  the program was called wrongly, or its configuration cannot be used";
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a made-up scene, detect its obstacles and write everything, to see what the program does.
+    Demo(DemoArgs),
+    /// Detect obstacles in a recording.
+    Replay(ReplayArgs),
+    /// Say what a recording, a calibration or a configuration holds, and what the detector can see with it.
+    Check(CheckArgs),
+    /// Work with CAN logs.
+    #[command(subcommand)]
+    Can(CanCommand),
+}
+
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Folder to write to; made if it is not there.
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    pub out: PathBuf,
+    /// Number of frames to render.
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub frames: u32,
+    /// Settings of the detector and of the bus.
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+impl Default for DemoArgs {
+    fn default() -> Self {
+        Self { out: "out/demo".into(), frames: 12, detector: DetectorArgs::default() }
+    }
+}
+
+/// Arguments of `replay`.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// Folder of the recording.
+    pub recording: PathBuf,
+    /// Folder to write to; made if it is not there. Files of an earlier run are replaced.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// What to write besides summary.json; everything if left out.
+    #[arg(long, value_name = "WHAT", value_delimiter = ',', default_values_t = Output::ALL)]
+    pub write: Vec<Output>,
+    /// Only these frames: `A..B` without B, `A..` to the end, or one number.
+    #[arg(long, value_name = "A..B", default_value = "..")]
+    pub frames: FrameRange,
+    /// Settings of the detector and of the bus.
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+/// Settings of the detector and of the bus, for every command that detects.
+#[derive(Debug, Default, Args)]
+pub struct DetectorArgs {
+    /// Settings in TOML; `docs/files.md` lists them all.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Number of disparities searched, px; an eighth of the picture's width if left out.
+    #[arg(long, value_name = "N")]
+    pub disparities: Option<u16>,
+    /// Node id on the bus.
+    #[arg(long, value_name = "N")]
+    pub node: Option<u8>,
+    /// Use CAN FD frames instead of classic ones.
+    #[arg(long)]
+    pub can_fd: bool,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Folder of a recording, calibration file (KITTI calib.txt, EuRoC sensor.yaml, OpenCV or ROS YAML), or
+    /// configuration in TOML.
+    pub path: PathBuf,
+    /// Calibration of the right camera, where each camera has a file of its own.
+    pub right: Option<PathBuf>,
+    /// Settings of the detector.
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+/// What to do with a CAN log.
+#[derive(Debug, Subcommand)]
+pub enum CanCommand {
+    /// Show the messages of a log in candump's format as text. Exit status 1 if one is damaged or missing.
+    Decode(DecodeArgs),
+}
+
+/// Arguments of `can decode`.
+#[derive(Debug, Args)]
+pub struct DecodeArgs {
+    /// The log, as `candump -L` writes it.
+    pub log: PathBuf,
+    /// One line of JSON for each message.
+    #[arg(long, conflicts_with = "map")]
+    pub json: bool,
+    /// Draw a map of each scan.
+    #[arg(long)]
+    pub map: bool,
+    /// Only messages of this node.
+    #[arg(long, value_name = "N")]
+    pub node: Option<u8>,
+}
+
+/// One kind of output of `replay`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Output {
+    /// cells.csv, obstacles.csv and ground.csv
+    Cells,
+    /// can.log
+    Can,
+    /// disparity/NNNNNN.png
+    Disparity,
+    /// classes/NNNNNN.png
+    Classes,
+    /// map/NNNNNN.png
+    Map,
+    /// report.html
+    Report,
+}
+
+impl Output {
+    /// Everything.
+    pub const ALL: [Self; 6] = [Self::Cells, Self::Can, Self::Disparity, Self::Classes, Self::Map, Self::Report];
+}
+
+impl std::fmt::Display for Output {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Cells => "cells",
+            Self::Can => "can",
+            Self::Disparity => "disparity",
+            Self::Classes => "classes",
+            Self::Map => "map",
+            Self::Report => "report",
+        })
+    }
+}
+
+/// Frame numbers from `start` up to, but without, `end`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameRange(pub Range<u32>);
+
+impl Default for FrameRange {
+    fn default() -> Self {
+        Self(0..u32::MAX)
+    }
+}
+
+impl FromStr for FrameRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str, absent| match text.trim() {
+            "" => Ok(absent),
+            text => text.parse().map_err(|error: ParseIntError| format!("`{text}`: {error}")),
+        };
+        let range = match text.split_once("..") {
+            Some((start, end)) => number(start, 0)?..number(end, u32::MAX)?,
+            None => {
+                let one: u32 = text.trim().parse().map_err(|_| "give it as A..B, as in 10..20".to_string())?;
+                one..one.saturating_add(1)
+            }
+        };
+        if range.is_empty() {
+            return Err("holds no frame: A must be less than B".to_string());
+        }
+        Ok(Self(range))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn frame_ranges() {
+        for (text, range) in [("..", 0..u32::MAX), ("3..7", 3..7), ("3..", 3..u32::MAX), ("..7", 0..7), ("5", 5..6)] {
+            assert_eq!(text.parse(), Ok(FrameRange(range)), "{text}");
+        }
+        for text in ["7..3", "3..3", "x", "1..y", "", "-1", "1...2"] {
+            assert!(text.parse::<FrameRange>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn outputs_can_be_picked() {
+        let cli = Cli::try_parse_from(["fencepost", "replay", "r", "--out", "o", "--write", "cells,can"]).unwrap();
+        let Some(Command::Replay(args)) = cli.command else { panic!("not replay") };
+        assert_eq!(args.write, [Output::Cells, Output::Can]);
+        assert_eq!(args.frames, FrameRange::default());
+    }
+
+    #[test]
+    fn no_command_is_the_demo() {
+        assert!(Cli::try_parse_from(["fencepost"]).unwrap().command.is_none());
+    }
+}

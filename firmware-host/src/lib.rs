@@ -1,0 +1,19 @@
+//! The program `fencepost`.
+#![deny(unsafe_code)]
+
+pub mod cli;
+pub mod config;
+pub mod console;
+pub mod detector;
+pub mod error;
+pub mod output;
+pub mod paint;
+pub mod view;
+pub mod words;
+
+use std::{ffi::OsString, process::ExitCode};
+
+/// Runs the program.
+pub fn run(_arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    ExitCode::SUCCESS
+}

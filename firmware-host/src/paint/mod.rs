@@ -1,0 +1,12 @@
+//! Pictures of what the detector sees.
+
+mod birdseye;
+mod canvas;
+mod colours;
+mod figures;
+mod labels;
+
+pub use birdseye::birdseye;
+pub use canvas::{Canvas, grey8_png, grey16_png};
+pub use colours::{GROUND, HIDDEN, NO_VALUE, OBSTACLE, reason_colour, value_colour};
+pub use figures::{Figures, classes, disparity16};

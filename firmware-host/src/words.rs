@@ -1,0 +1,59 @@
+//! Names of things as they are written in files and reports.
+
+use fencepost_core::{
+    detector::Stage,
+    disparity::Reason,
+    health::{Health, HealthLevel, HealthReason},
+};
+
+/// Name of a level as it is written in files.
+pub const fn level_name(level: HealthLevel) -> &'static str {
+    match level {
+        HealthLevel::Ok => "ok",
+        HealthLevel::Degraded => "degraded",
+        HealthLevel::Blind => "blind",
+        HealthLevel::Fault => "fault",
+    }
+}
+
+/// Every level, from good to bad.
+pub const LEVELS: [HealthLevel; 4] = [HealthLevel::Ok, HealthLevel::Degraded, HealthLevel::Blind, HealthLevel::Fault];
+
+/// Names of the reasons of `health`, joined by `separator`.
+pub fn reason_names(health: Health, separator: &str) -> String {
+    let names: Vec<_> = HealthReason::ALL.into_iter().filter(|r| health.has(*r)).map(HealthReason::name).collect();
+    names.join(separator)
+}
+
+/// Why a pixel has no disparity, in words.
+pub const fn reason_words(reason: Reason) -> &'static str {
+    match reason {
+        Reason::OutsideValidArea => "outside the valid area",
+        Reason::LowTexture => "too little texture",
+        Reason::NotUnique => "not unique",
+        Reason::LeftRightMismatch => "left and right disagree",
+        Reason::SmallSurface => "surface too small",
+        Reason::Saturated => "saturated",
+        Reason::OutOfRange => "out of the disparity range",
+    }
+}
+
+/// What a stage does, in words.
+pub const fn stage_words(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Rectify => "brings the rows of left and right in line",
+        Stage::Match => "finds each pixel of the left picture in the right one",
+        Stage::Validate => "drops surfaces too small to be believed",
+        Stage::Surfaces => "joins pixels to surfaces and fits a plane to each",
+        Stage::Ground => "joins level surfaces and fits the ground plane",
+        Stage::Obstacles => "joins upright surfaces and measures them",
+        Stage::Map => "sorts everything into cells",
+    }
+}
+
+/// A number of bytes for people.
+pub fn bytes(count: usize) -> String {
+    const KIB: f64 = 1024.0;
+    let count = count as f64;
+    if count >= KIB * KIB { format!("{:.1} MiB", count / (KIB * KIB)) } else { format!("{:.0} KiB", count / KIB) }
+}
