@@ -14,6 +14,9 @@
 #![no_std]
 #![deny(unsafe_code)]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod detector;
 pub mod disparity;
 pub mod error;
@@ -30,3 +33,6 @@ pub mod settings;
 pub mod surfaces;
 pub mod validate;
 pub mod wire;
+
+#[cfg(test)]
+mod test_random;

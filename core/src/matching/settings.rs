@@ -39,20 +39,34 @@ pub struct MatchSettings {
 
 impl Default for MatchSettings {
     fn default() -> Self {
-        Self {
-            disparities: 64,
-            min_disparity: 0,
-            window: 7,
-            prefilter: Prefilter::HorizontalSobel,
-            texture: 24,
-            uniqueness_percent: 5,
-            back_check_px: Some(1),
-            saturated_percent: 60,
-        }
+        Self::DEFAULT
     }
 }
 
 impl MatchSettings {
+    /// The defaults.
+    pub const DEFAULT: Self = Self {
+        disparities: 64,
+        min_disparity: 0,
+        window: 7,
+        prefilter: Prefilter::HorizontalSobel,
+        texture: 24,
+        uniqueness_percent: 5,
+        back_check_px: Some(1),
+        saturated_percent: 60,
+    };
+    /// All zero, for a matcher that is not configured: a detector of zeros takes no room in the image of a program.
+    pub(super) const UNSET: Self = Self {
+        disparities: 0,
+        min_disparity: 0,
+        window: 0,
+        prefilter: Prefilter::HorizontalSobel,
+        texture: 0,
+        uniqueness_percent: 0,
+        back_check_px: None,
+        saturated_percent: 0,
+    };
+
     /// Smallest window.
     pub const MIN_WINDOW: u16 = 5;
     /// Largest window: its sums still fit 16 bits.
