@@ -4,6 +4,7 @@ use fencepost_core::{
     detector::Detection,
     disparity::DisparityPicture,
     geometry::{RectifiedPair, VehicleFrame},
+    health::Health,
     picture::Picture,
     surfaces::Surface,
 };
@@ -21,8 +22,10 @@ pub struct FrameView<'a> {
     pub left: Picture<'a>,
     /// Disparity of the left rectified picture.
     pub disparity: DisparityPicture<'a>,
-    /// Cells, ground, obstacles, health.
+    /// Cells, ground, obstacles.
     pub detection: &'a Detection<OBSTACLES, CELLS>,
+    /// How far this can be trusted: what the detector says, and what the bus has to add.
+    pub health: Health,
     /// The rectified cameras.
     pub pair: &'a RectifiedPair,
     /// How the left camera sits on the vehicle.
@@ -52,7 +55,7 @@ pub(crate) mod testing {
         disparity::{DisparityPixel, Reason},
         geometry::Mount,
         ground::GroundPlane,
-        health::{Health, HealthLevel, HealthReason},
+        health::{HealthLevel, HealthReason},
         map::{Cell, CellState, MapGeometry, ObstacleMap, SectorDistances, UnknownReason},
         obstacles::Obstacle,
         surfaces::SurfaceClass,
@@ -139,6 +142,7 @@ pub(crate) mod testing {
                 left: Picture::packed(&self.left, WIDTH, HEIGHT).unwrap(),
                 disparity: DisparityPicture::new(&self.pixels, WIDTH),
                 detection: &self.detection,
+                health: self.detection.health,
                 pair: &self.pair,
                 vehicle: &self.vehicle,
                 surface_at: &surface_at,

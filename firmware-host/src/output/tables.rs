@@ -136,7 +136,7 @@ fn obstacle_fields(view: &FrameView<'_>, index: usize, obstacle: &Obstacle) -> [
 }
 
 fn ground_fields(view: &FrameView<'_>) -> [String; 15] {
-    let health = view.detection.health;
+    let health = view.health;
     let ground = view.detection.ground.as_ref();
     let field = |text: &dyn Fn(&GroundPlane) -> String| ground.map(text).unwrap_or_default();
     [

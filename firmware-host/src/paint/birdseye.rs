@@ -201,7 +201,7 @@ fn paint_words(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
     let left_top = text_style(Alignment::Left, Baseline::Top);
     let (width, height) = scale.map_px();
 
-    let health = view.detection.health;
+    let health = view.health;
     let reasons = words::reason_names(health, ", ");
     let level = words::level_name(health.level);
     let title = match reasons.is_empty() {
