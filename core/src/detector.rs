@@ -3,16 +3,19 @@
 use heapless::Vec;
 
 use crate::{
-    disparity::DisparityPicture,
+    disparity::{DisparityPicture, DisparityPixel},
     error::ConfigError,
-    geometry::{Mount, RectifiedPair, StereoCalibration, VehicleFrame},
-    ground::GroundPlane,
-    health::Health,
-    map::{ObstacleMap, SectorDistances},
-    obstacles::Obstacle,
+    geometry::{DepthTable, Mount, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
+    ground::{GroundFinder, GroundPlane},
+    health::{Health, HealthLevel},
+    map::{CellState, MapBuilder, ObstacleMap, SectorDistances, View},
+    matching::{MatchSettings, Matcher, ValidSpan},
+    obstacles::{Obstacle, ObstacleFinder},
     picture::Picture,
+    rectify::{Rectifier, Side},
     settings::Settings,
-    surfaces::Surface,
+    surfaces::{Regions, Surface, SurfaceClass, SurfaceReport, Surfaces},
+    validate::SurfaceSize,
 };
 
 /// The stages, in the order in which they run.
@@ -115,8 +118,11 @@ pub enum DetectError {
     },
 }
 
-/// The detector. `PIXELS` bounds width x height, `WIDTH` the width, `DISPARITIES` the search range; `GRID` is the number
-/// of nodes of the rectification map; `SURFACES`, `OBSTACLES` and `CELLS` are the capacities of the tables.
+/// The detector: every stage and every buffer.
+///
+/// `PIXELS` bounds width x height, `WIDTH` the width, `DISPARITIES` the search range; `GRID` is the number of nodes of the
+/// rectification map; `SURFACES`, `OBSTACLES` and `CELLS` are the capacities of the tables. A detector that is not
+/// configured is all zero: in a `static` it takes no room in the image of the program.
 pub struct Detector<
     const PIXELS: usize,
     const WIDTH: usize,
@@ -126,6 +132,302 @@ pub struct Detector<
     const OBSTACLES: usize,
     const CELLS: usize,
 > {
+    setup: Option<Setup>,
+    rectifier: Rectifier<GRID>,
+    rows: [[u8; WIDTH]; 2],
+    matcher: Matcher<WIDTH, DISPARITIES>,
+    disparity: [DisparityPixel; PIXELS],
+    surface_size: SurfaceSize<WIDTH>,
+    depth: DepthTable<DISPARITIES>,
+    surfaces: Surfaces<PIXELS, SURFACES>,
+    regions: Regions<SURFACES>,
+    ground: GroundFinder,
+    obstacles: ObstacleFinder,
+    map: MapBuilder<CELLS>,
     detection: Detection<OBSTACLES, CELLS>,
-    pair: Option<RectifiedPair>,
+}
+
+/// What follows from calibration and mount.
+#[derive(Clone, Copy)]
+struct Setup {
+    pair: RectifiedPair,
+    frame: VehicleFrame,
+    rays: Rays,
+    nearest_m: f32,
+}
+
+impl<
+    const PIXELS: usize,
+    const WIDTH: usize,
+    const DISPARITIES: usize,
+    const GRID: usize,
+    const SURFACES: usize,
+    const OBSTACLES: usize,
+    const CELLS: usize,
+> Detector<PIXELS, WIDTH, DISPARITIES, GRID, SURFACES, OBSTACLES, CELLS>
+{
+    /// A detector that is not configured.
+    pub const fn new() -> Self {
+        Self {
+            setup: None,
+            rectifier: Rectifier::new(),
+            rows: [[0; WIDTH]; 2],
+            matcher: Matcher::new(),
+            disparity: [DisparityPixel::from_bits(0); PIXELS],
+            surface_size: SurfaceSize::new(),
+            depth: DepthTable::new(),
+            surfaces: Surfaces::new(),
+            regions: Regions::new(),
+            ground: GroundFinder::new(),
+            obstacles: ObstacleFinder::new(),
+            map: MapBuilder::new(),
+            detection: Detection::new(),
+        }
+    }
+
+    /// Takes settings, calibration and mount, and forgets all that was seen before.
+    ///
+    /// # Errors
+    /// The first value that cannot be used. The detector is not configured then.
+    pub fn configure(
+        &mut self,
+        settings: &Settings,
+        calibration: &StereoCalibration,
+        mount: &Mount,
+    ) -> Result<(), ConfigError> {
+        self.setup = None;
+        let frame = VehicleFrame::new(mount)?;
+        let pair = self.rectifier.configure(calibration)?;
+        let (width, height) = (pair.width as usize, pair.height as usize);
+        self.surfaces.configure(&settings.surfaces, width, height)?;
+        self.matcher.configure(&settings.matching, width, height)?;
+        self.surface_size.configure(&settings.validate, width)?;
+        let MatchSettings { min_disparity, disparities, .. } = settings.matching;
+        self.depth.configure(&pair, min_disparity, disparities);
+        self.ground.configure(&settings.ground, &frame, mount.height_m.is_some(), width * height)?;
+        self.obstacles.configure(&settings.obstacles)?;
+        self.map.configure(&settings.map, (settings.obstacles.min_height_m, settings.obstacles.clearance_m))?;
+        // The last disparity has no neighbour to interpolate with and is never reported.
+        let largest = f32::from(min_disparity) + f32::from(disparities) - 2.0;
+        let nearest_m = pair.distance_m(largest);
+        self.setup = Some(Setup { pair, frame, rays: Rays::new(&pair, &frame), nearest_m });
+        self.detection = Detection::new();
+        Ok(())
+    }
+
+    /// Looks at a pair of pictures. `probe` is told which stage runs.
+    ///
+    /// # Errors
+    /// [`DetectError`]; the detection is empty then.
+    ///
+    /// # Bound
+    /// The sum of the bounds of the stages: linear in `width x height x disparities`.
+    pub fn detect(
+        &mut self,
+        left: &Picture<'_>,
+        right: &Picture<'_>,
+        probe: &mut impl Probe,
+    ) -> Result<&Detection<OBSTACLES, CELLS>, DetectError> {
+        self.detection.clear();
+        let Some(setup) = self.setup else { return Err(DetectError::NotConfigured) };
+        let expected = (setup.pair.width as usize, setup.pair.height as usize);
+        for picture in [left, right] {
+            let found = (picture.width(), picture.height());
+            if found != expected {
+                return Err(DetectError::WrongSize { found, expected });
+            }
+        }
+        let (width, height) = expected;
+        self.match_rows(left, right, width, height, probe);
+
+        probe.enter(Stage::Validate);
+        let disparity = &mut self.disparity[..width * height];
+        self.surface_size.run(disparity);
+
+        probe.enter(Stage::Surfaces);
+        let picture = DisparityPicture::new(disparity, width);
+        let report = self.surfaces.run(picture, &self.depth, &setup.rays);
+
+        probe.enter(Stage::Ground);
+        let ground = self.ground.run(&mut self.surfaces, &mut self.regions, picture);
+        let plane = ground.unwrap_or(GroundPlane::of_mount(&setup.frame));
+
+        probe.enter(Stage::Obstacles);
+        let detection = &mut self.detection;
+        detection.statistics.obstacles_dropped =
+            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &plane, &mut detection.obstacles);
+
+        probe.enter(Stage::Map);
+        let Setup { pair, frame, rays, nearest_m } = &setup;
+        let view = View { pair, frame, rays, depth: &self.depth, nearest_m: *nearest_m };
+        self.map.run(&self.surfaces, picture, &view, &plane, ground.is_some(), &mut detection.map);
+        detection.sectors = SectorDistances::of(&detection.map);
+        detection.ground = ground;
+        detection.statistics.count(picture, report, self.surfaces.table(), &detection.map);
+        Ok(&self.detection)
+    }
+
+    /// Rectifies and matches, row by row.
+    fn match_rows(
+        &mut self,
+        left: &Picture<'_>,
+        right: &Picture<'_>,
+        width: usize,
+        height: usize,
+        probe: &mut impl Probe,
+    ) {
+        self.matcher.begin();
+        let [left_row, right_row] = &mut self.rows;
+        let mut next = 0;
+        for y in 0..height {
+            probe.enter(Stage::Rectify);
+            let left_span = self.rectifier.row(Side::Left, left, y, &mut left_row[..width]);
+            let right_span = self.rectifier.row(Side::Right, right, y, &mut right_row[..width]);
+            probe.enter(Stage::Match);
+            self.matcher.push(
+                &left_row[..width],
+                &right_row[..width],
+                ValidSpan::from(left_span),
+                ValidSpan::from(right_span),
+            );
+            while let Some(out) = self.disparity.get_mut(next * width..(next + 1) * width) {
+                if !self.matcher.pull(next, out) {
+                    break;
+                }
+                next += 1;
+            }
+        }
+    }
+
+    /// What the last pair of pictures said.
+    pub const fn detection(&self) -> &Detection<OBSTACLES, CELLS> {
+        &self.detection
+    }
+
+    /// The disparity picture of the last pair, of the left rectified picture.
+    pub fn disparity(&self) -> DisparityPicture<'_> {
+        let (width, height) =
+            self.setup.map_or((0, 0), |setup| (setup.pair.width as usize, setup.pair.height as usize));
+        DisparityPicture::new(&self.disparity[..width * height], width)
+    }
+
+    /// The rectified pair; `None` before [`Self::configure`].
+    pub fn pair(&self) -> Option<&RectifiedPair> {
+        self.setup.as_ref().map(|setup| &setup.pair)
+    }
+
+    /// Where the left camera sits; `None` before [`Self::configure`].
+    pub fn frame(&self) -> Option<&VehicleFrame> {
+        self.setup.as_ref().map(|setup| &setup.frame)
+    }
+
+    /// Nearest distance along the optical axis that the disparity range reaches, metres; `None` before [`Self::configure`].
+    pub fn nearest_m(&self) -> Option<f32> {
+        self.setup.as_ref().map(|setup| setup.nearest_m)
+    }
+
+    /// The surface at pixel `(x, y)` of the last pair.
+    pub fn surface_at(&self, x: usize, y: usize) -> Option<&Surface> {
+        self.surfaces.surface_at(x, y)
+    }
+
+    /// The surfaces of the last pair and the tables behind them.
+    pub const fn surfaces(&self) -> &Surfaces<PIXELS, SURFACES> {
+        &self.surfaces
+    }
+
+    /// The rectifier, to draw on rectified pictures.
+    pub const fn rectifier(&self) -> &Rectifier<GRID> {
+        &self.rectifier
+    }
+}
+
+impl<
+    const PIXELS: usize,
+    const WIDTH: usize,
+    const DISPARITIES: usize,
+    const GRID: usize,
+    const SURFACES: usize,
+    const OBSTACLES: usize,
+    const CELLS: usize,
+> Default for Detector<PIXELS, WIDTH, DISPARITIES, GRID, SURFACES, OBSTACLES, CELLS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const OBSTACLES: usize, const CELLS: usize> Detection<OBSTACLES, CELLS> {
+    /// Nothing seen.
+    pub const fn new() -> Self {
+        Self {
+            map: ObstacleMap::EMPTY,
+            sectors: SectorDistances::UNSET,
+            ground: None,
+            obstacles: Vec::new(),
+            health: Health { level: HealthLevel::Ok, reasons: 0 },
+            statistics: Statistics::NONE,
+        }
+    }
+
+    /// Forgets what was seen, without moving the tables.
+    fn clear(&mut self) {
+        self.map.cells.clear();
+        self.sectors = SectorDistances::default();
+        self.ground = None;
+        self.obstacles.clear();
+        self.health = Health::OK;
+        self.statistics = Statistics::NONE;
+    }
+}
+
+impl<const OBSTACLES: usize, const CELLS: usize> Default for Detection<OBSTACLES, CELLS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Statistics {
+    const NONE: Self = Self {
+        pixels_with_disparity: 0,
+        pixels_without: [0; 7],
+        surfaces: 0,
+        surfaces_dropped: 0,
+        surfaces_horizontal: 0,
+        surfaces_vertical: 0,
+        obstacles_dropped: 0,
+        cells_obstacle: 0,
+        cells_free: 0,
+    };
+
+    fn count<const CELLS: usize>(
+        &mut self,
+        picture: DisparityPicture<'_>,
+        report: SurfaceReport,
+        surfaces: &[Surface],
+        map: &ObstacleMap<CELLS>,
+    ) {
+        for pixel in picture.pixels() {
+            match pixel.get() {
+                Ok(_) => self.pixels_with_disparity += 1,
+                Err(reason) => self.pixels_without[reason as usize] += 1,
+            }
+        }
+        self.surfaces = surfaces.len() as u32;
+        self.surfaces_dropped = report.dropped;
+        for surface in surfaces {
+            match surface.class {
+                SurfaceClass::Ground | SurfaceClass::Horizontal => self.surfaces_horizontal += 1,
+                SurfaceClass::Vertical | SurfaceClass::Obstacle => self.surfaces_vertical += 1,
+                SurfaceClass::Slanted | SurfaceClass::Undefined => {}
+            }
+        }
+        for cell in &map.cells {
+            match cell.state {
+                CellState::Obstacle => self.cells_obstacle += 1,
+                CellState::Free => self.cells_free += 1,
+                CellState::Unknown(_) => {}
+            }
+        }
+    }
 }

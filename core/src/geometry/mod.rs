@@ -4,7 +4,11 @@
 //! camera (REP-103). Metres and radians.
 
 mod calibration;
+mod depth;
 mod mount;
+mod rays;
 
 pub use calibration::{CameraModel, Distortion, RawPair, Rectification, RectifiedPair, StereoCalibration};
+pub use depth::DepthTable;
 pub use mount::{Mount, VehicleFrame};
+pub use rays::Rays;

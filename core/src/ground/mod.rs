@@ -1,50 +1,165 @@
 //! The ground plane.
 
-/// The ground in the vehicle frame: points `p` with `normal . p = offset_m`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GroundPlane {
-    /// Unit normal, upward.
-    pub normal: [f32; 3],
-    /// Height of the plane at the origin along the normal, metres; 0 if the mount is right and the ground is level.
-    pub offset_m: f32,
-    /// Distance of the left camera from the plane, metres.
-    pub camera_height_m: f32,
-    /// Tilt of the optical axis below the plane, radians.
-    pub pitch_down_rad: f32,
-    /// Roll of the camera against the plane, radians.
-    pub roll_rad: f32,
-    /// Pixels that support it.
-    pub support: u32,
-    /// Root mean square distance of its surfaces from the plane, metres.
-    pub rms_m: f32,
-    /// Frames since it was last seen; 0 if it was seen in this one.
-    pub age_frames: u16,
+mod plane;
+mod settings;
+
+pub use plane::GroundPlane;
+pub use settings::GroundSettings;
+
+use crate::{
+    disparity::DisparityPicture,
+    error::ConfigError,
+    geometry::VehicleFrame,
+    planes::Scatter,
+    surfaces::{Regions, Surface, SurfaceClass, Surfaces},
+};
+
+/// Rounds of choosing the surfaces near the plane and fitting it again. The choice settles after two or three.
+const REFINEMENTS: usize = 4;
+
+/// Regions that are tried, largest first, before a frame is said to have no ground.
+const ATTEMPTS: usize = 4;
+
+/// Finds the ground plane from the near-horizontal surfaces.
+///
+/// Source: the paper, section 4.4: the surfaces within 30 degrees of horizontal are joined over the whole picture, and a plane
+/// is fitted to the largest region by orthogonal distance regression. Then the plane is fitted anew to all near-horizontal
+/// surfaces that lie on it, wherever they are: bits of ground seen between obstacles count too.
+///
+/// # Bound
+/// The joining of regions, and up to 20 passes over the table of surfaces.
+pub struct GroundFinder {
+    settings: GroundSettings,
+    frame: Option<VehicleFrame>,
+    height_known: bool,
+    min_support: f32,
+    last: Option<GroundPlane>,
 }
 
-impl GroundPlane {
-    /// Height of a point of the vehicle frame above the plane, metres.
-    pub fn height_m(&self, p: [f32; 3]) -> f32 {
-        self.normal[0] * p[0] + self.normal[1] * p[1] + self.normal[2] * p[2] - self.offset_m
+impl GroundFinder {
+    /// A stage that is not configured and finds nothing.
+    pub const fn new() -> Self {
+        Self { settings: GroundSettings::UNSET, frame: None, height_known: false, min_support: 0.0, last: None }
+    }
+
+    /// Takes settings, the frame of the vehicle and the size of the pictures, and forgets the ground of earlier frames.
+    ///
+    /// # Errors
+    /// The first setting that cannot be used, named `ground.*`.
+    pub fn configure(
+        &mut self,
+        settings: &GroundSettings,
+        frame: &VehicleFrame,
+        height_known: bool,
+        pixels: usize,
+    ) -> Result<(), ConfigError> {
+        settings.check()?;
+        self.settings = *settings;
+        self.frame = Some(*frame);
+        self.height_known = height_known;
+        self.min_support = settings.min_support_permille * 1.0e-3 * pixels as f32;
+        self.last = None;
+        Ok(())
+    }
+
+    /// Finds the ground, or holds that of an earlier frame, and gives the surfaces on it their class.
+    pub fn run<const PIXELS: usize, const SURFACES: usize>(
+        &mut self,
+        surfaces: &mut Surfaces<PIXELS, SURFACES>,
+        regions: &mut Regions<SURFACES>,
+        picture: DisparityPicture<'_>,
+    ) -> Option<GroundPlane> {
+        let frame = self.frame?;
+        regions.join(surfaces, picture, |surface| self.may_be_ground(surface));
+        let found = self.find(surfaces.table(), regions, &frame);
+        let plane = found.or_else(|| {
+            let last = self.last?;
+            let age_frames = last.age_frames.saturating_add(1);
+            (age_frames <= self.settings.hold_frames).then_some(GroundPlane { age_frames, ..last })
+        });
+        self.last = plane;
+        if let Some(plane) = plane {
+            for surface in surfaces.table_mut() {
+                if surface.class == SurfaceClass::Horizontal && self.lies_on(&plane, surface, 1.0) {
+                    surface.class = SurfaceClass::Ground;
+                }
+            }
+        }
+        plane
+    }
+
+    /// Whether a surface is near-horizontal and where ground can be, for all tilts and heights that are allowed.
+    fn may_be_ground(&self, surface: &Surface) -> bool {
+        let [x, y, z] = surface.points.mean_m;
+        let slope = libm::tanf(self.settings.max_tilt_deg.to_radians());
+        let reach = if self.height_known { self.settings.height_tolerance_m } else { f32::INFINITY };
+        let level = if self.height_known { 0.0 } else { f32::NEG_INFINITY };
+        let allowance = reach + slope * libm::sqrtf(x * x + y * y);
+        surface.class == SurfaceClass::Horizontal && z <= allowance && z >= level - allowance
+    }
+
+    fn find<const SURFACES: usize>(
+        &self,
+        table: &[Surface],
+        regions: &Regions<SURFACES>,
+        frame: &VehicleFrame,
+    ) -> Option<GroundPlane> {
+        let mut below = f32::INFINITY;
+        for _ in 0..ATTEMPTS {
+            // The largest region that was not tried yet; the first of equals.
+            let mut best: Option<Scatter> = None;
+            for root in regions.roots() {
+                if !table.get(root).is_some_and(|surface| self.may_be_ground(surface)) {
+                    continue;
+                }
+                let members = regions.members(root).filter_map(|place| table.get(place));
+                let region = members.fold(Scatter::default(), |all, surface| all.joined(&surface.points));
+                if region.weight < below && best.is_none_or(|best| region.weight > best.weight) {
+                    best = Some(region);
+                }
+            }
+            let region = best.filter(|region| region.weight >= self.min_support)?;
+            below = region.weight;
+            if let Some(plane) = GroundPlane::through(&region, frame).and_then(|plane| self.refine(plane, table, frame))
+            {
+                return Some(plane);
+            }
+        }
+        None
+    }
+
+    /// Fits the plane anew to all surfaces near it, until it is within the limits or is given up.
+    fn refine(&self, mut plane: GroundPlane, table: &[Surface], frame: &VehicleFrame) -> Option<GroundPlane> {
+        for round in 0..REFINEMENTS {
+            // A first plane may be bent by what is not ground: it is forgiven more.
+            let slack = if round == 0 { 2.0 } else { 1.0 };
+            let near =
+                table.iter().filter(|surface| self.may_be_ground(surface) && self.lies_on(&plane, surface, slack));
+            let points = near.fold(Scatter::default(), |all, surface| all.joined(&surface.points));
+            plane = GroundPlane::through(&points, frame)?;
+        }
+        self.plausible(&plane).then_some(plane)
+    }
+
+    fn lies_on(&self, plane: &GroundPlane, surface: &Surface, slack: f32) -> bool {
+        let [x, y, _] = surface.points.mean_m;
+        let range = libm::sqrtf(x * x + y * y);
+        let tolerance = self.settings.surface_tolerance_m + self.settings.surface_tolerance_per_m * range;
+        plane.height_m(surface.points.mean_m).abs() <= slack * tolerance
+    }
+
+    fn plausible(&self, plane: &GroundPlane) -> bool {
+        let level = plane.normal[2] >= libm::cosf(self.settings.max_tilt_deg.to_radians());
+        let expected = self.frame.map_or(0.0, |frame| frame.camera_height_m());
+        let off = (plane.camera_height_m - expected).abs();
+        let height =
+            if self.height_known { off <= self.settings.height_tolerance_m } else { plane.camera_height_m > 0.05 };
+        level && height && plane.support as f32 >= self.min_support
     }
 }
 
-/// Settings of the ground plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct GroundSettings {
-    /// Largest tilt against the vehicle's horizontal, degrees.
-    pub max_tilt_deg: f32,
-    /// Largest difference between the height of the camera above the plane and that of the mount, metres, where the
-    /// height of the mount is known.
-    pub height_tolerance_m: f32,
-    /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
-    pub min_support_permille: f32,
-    /// Frames for which the last plane is held when a frame has none.
-    pub hold_frames: u16,
-}
-
-impl Default for GroundSettings {
+impl Default for GroundFinder {
     fn default() -> Self {
-        Self { max_tilt_deg: 20.0, height_tolerance_m: 0.5, min_support_permille: 5.0, hold_frames: 10 }
+        Self::new()
     }
 }

@@ -126,3 +126,11 @@ pub struct ObstacleMap<const CELLS: usize> {
     /// The cells, in the order of [`MapGeometry::index`].
     pub cells: Vec<Cell, CELLS, u16>,
 }
+
+impl<const CELLS: usize> ObstacleMap<CELLS> {
+    /// A map without cells.
+    pub const EMPTY: Self = Self {
+        geometry: MapGeometry { cell_size_mm: 0, x_first: 0, x_count: 0, y_first: 0, y_count: 0 },
+        cells: Vec::new(),
+    };
+}

@@ -1,15 +1,12 @@
 //! The map: square cells on the ground around the robot, and distances by sector.
 
+mod builder;
 mod cells;
 mod sectors;
+mod settings;
+mod shadow;
 
+pub use builder::{MapBuilder, View};
 pub use cells::{Cell, CellState, MapGeometry, ObstacleMap, UnknownReason};
 pub use sectors::{SECTOR_CLEAR_DM, SECTOR_COUNT, SECTOR_UNKNOWN, SectorDistances};
-
-/// Settings of the map.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct MapSettings {
-    /// Where the cells lie.
-    pub geometry: MapGeometry,
-}
+pub use settings::MapSettings;

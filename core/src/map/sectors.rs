@@ -1,5 +1,7 @@
 //! The nearest obstacle in each direction.
 
+use super::{CellState, ObstacleMap, UnknownReason};
+
 /// Number of sectors.
 pub const SECTOR_COUNT: usize = 20;
 
@@ -23,5 +25,50 @@ pub struct SectorDistances {
 impl Default for SectorDistances {
     fn default() -> Self {
         Self { left_deg: 50.0, width_deg: 5.0, distance_dm: [SECTOR_UNKNOWN; SECTOR_COUNT] }
+    }
+}
+
+impl SectorDistances {
+    /// All zero, for a map that was not made yet.
+    pub(crate) const UNSET: Self = Self { left_deg: 0.0, width_deg: 0.0, distance_dm: [0; SECTOR_COUNT] };
+
+    /// The distances that a map holds.
+    ///
+    /// A sector is clear if at least half of its cells in view were seen to be free and none is an obstacle.
+    ///
+    /// # Bound
+    /// One pass over the cells.
+    pub fn of<const CELLS: usize>(map: &ObstacleMap<CELLS>) -> Self {
+        let mut sectors = Self::default();
+        let mut nearest_m = [f32::INFINITY; SECTOR_COUNT];
+        let (mut free, mut in_view) = ([0u16; SECTOR_COUNT], [0u16; SECTOR_COUNT]);
+        for (index, cell) in map.cells.iter().enumerate() {
+            let (i, j) = map.geometry.cell_at(index);
+            let (x, y) = map.geometry.centre_m(i, j);
+            let place = (sectors.left_deg - libm::atan2f(y, x).to_degrees()) / sectors.width_deg;
+            if x <= 0.0 || place < 0.0 || place >= SECTOR_COUNT as f32 {
+                continue;
+            }
+            let place = place as usize;
+            match cell.state {
+                CellState::Obstacle => nearest_m[place] = nearest_m[place].min(libm::sqrtf(x * x + y * y)),
+                CellState::Free => free[place] += 1,
+                CellState::Unknown(UnknownReason::OutsideView | UnknownReason::TooFar | UnknownReason::TooNear) => {
+                    continue;
+                }
+                CellState::Unknown(_) => {}
+            }
+            in_view[place] += 1;
+        }
+        for (place, distance_dm) in sectors.distance_dm.iter_mut().enumerate() {
+            *distance_dm = if nearest_m[place].is_finite() {
+                libm::roundf(nearest_m[place] * 10.0).min(f32::from(SECTOR_CLEAR_DM - 1)) as u8
+            } else if free[place] > 0 && free[place] >= in_view[place].div_ceil(2) {
+                SECTOR_CLEAR_DM
+            } else {
+                SECTOR_UNKNOWN
+            };
+        }
+        sectors
     }
 }

@@ -30,6 +30,13 @@ impl ValidSpan {
     }
 }
 
+impl From<core::ops::Range<usize>> for ValidSpan {
+    fn from(span: core::ops::Range<usize>) -> Self {
+        let place = |x: usize| x.min(usize::from(u16::MAX)) as u16;
+        Self { start: place(span.start), end: place(span.end) }
+    }
+}
+
 /// One filtered row of the pair.
 #[derive(Clone, Copy)]
 pub(super) struct FilteredRow<'a> {

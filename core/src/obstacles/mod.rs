@@ -1,13 +1,27 @@
 //! Obstacles: near-vertical surfaces that belong together and pass the thresholds.
 
+mod settings;
+
+pub use settings::ObstacleSettings;
+
+use heapless::Vec;
+
+use crate::{
+    disparity::DisparityPicture,
+    error::ConfigError,
+    ground::GroundPlane,
+    planes::{Scatter, SymmetricMatrix3},
+    surfaces::{Regions, Surface, SurfaceClass, Surfaces},
+};
+
 /// One obstacle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Obstacle {
     /// Middle of its points in the vehicle frame, metres.
     pub mean_m: [f32; 3],
-    /// Smallest x, y and height above the ground, metres.
+    /// Smallest x and y in the vehicle frame, and lowest height above the ground, metres.
     pub min_m: [f32; 3],
-    /// Largest x, y and height above the ground, metres.
+    /// Largest x and y in the vehicle frame, and greatest height above the ground, metres.
     pub max_m: [f32; 3],
     /// Direction of its largest extent on the ground, radians from +x towards +y, in -pi/2 ..= pi/2.
     pub orientation_rad: f32,
@@ -29,22 +43,145 @@ impl Obstacle {
     }
 }
 
-/// Settings of the obstacles.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct ObstacleSettings {
-    /// An obstacle reaches at least this height above the ground, metres. The paper, section 4.1: 0.25.
-    pub min_height_m: f32,
-    /// What begins above this height can be driven under, metres.
-    pub clearance_m: f32,
-    /// An obstacle has at least this many pixels.
-    pub min_pixels: u16,
-    /// An obstacle is at least this long, wide or high, metres.
-    pub min_size_m: f32,
+/// Half the length of a uniform distribution in standard deviations: extents are told from the moments, so that a few stray
+/// pixels do not stretch them.
+const HALF_LENGTH: f32 = 1.732_050_8;
+
+/// Joins surfaces that stand up from the ground into obstacles.
+///
+/// Source: the paper, section 4.4. A surface takes part if it is near-vertical, or if it is neither that nor ground and its
+/// middle lies above the least height of an obstacle: a bonnet or a table top is no ground, however flat it is.
+///
+/// # Bound
+/// The joining of regions, and three passes over the table of surfaces.
+pub struct ObstacleFinder {
+    settings: ObstacleSettings,
 }
 
-impl Default for ObstacleSettings {
-    fn default() -> Self {
-        Self { min_height_m: 0.25, clearance_m: 2.2, min_pixels: 40, min_size_m: 0.15 }
+impl ObstacleFinder {
+    /// A stage that is not configured.
+    pub const fn new() -> Self {
+        Self { settings: ObstacleSettings::UNSET }
     }
+
+    /// Takes settings.
+    ///
+    /// # Errors
+    /// The first setting that cannot be used, named `obstacles.*`.
+    pub fn configure(&mut self, settings: &ObstacleSettings) -> Result<(), ConfigError> {
+        settings.check()?;
+        self.settings = *settings;
+        Ok(())
+    }
+
+    /// Settings in force.
+    pub const fn settings(&self) -> &ObstacleSettings {
+        &self.settings
+    }
+
+    /// Finds the obstacles, nearest first, and gives their surfaces their class. Heights are measured from `ground`. Where
+    /// there is no room the farthest are left out of the list (their surfaces keep their class); returns how many.
+    pub fn run<const PIXELS: usize, const SURFACES: usize, const OBSTACLES: usize>(
+        &mut self,
+        surfaces: &mut Surfaces<PIXELS, SURFACES>,
+        regions: &mut Regions<SURFACES>,
+        picture: DisparityPicture<'_>,
+        ground: &GroundPlane,
+        obstacles: &mut Vec<Obstacle, OBSTACLES, u16>,
+    ) -> u32 {
+        obstacles.clear();
+        let mut dropped = 0;
+        regions.join(surfaces, picture, |surface| self.stands_up(surface, ground));
+        for root in regions.roots() {
+            let table = surfaces.table();
+            if !table.get(root).is_some_and(|surface| self.stands_up(surface, ground)) {
+                continue;
+            }
+            let Some(obstacle) = self.measure(regions.members(root).filter_map(|place| table.get(place)), ground)
+            else {
+                continue;
+            };
+            for place in regions.members(root) {
+                if let Some(surface) = surfaces.table_mut().get_mut(place) {
+                    surface.class = SurfaceClass::Obstacle;
+                }
+            }
+            dropped += insert(obstacles, obstacle);
+        }
+        dropped
+    }
+
+    fn stands_up(&self, surface: &Surface, ground: &GroundPlane) -> bool {
+        match surface.class {
+            SurfaceClass::Vertical | SurfaceClass::Obstacle => true,
+            SurfaceClass::Ground => false,
+            SurfaceClass::Horizontal | SurfaceClass::Slanted | SurfaceClass::Undefined => {
+                ground.height_m(surface.points.mean_m) >= self.settings.min_height_m
+            }
+        }
+    }
+
+    /// The obstacle that the surfaces make, if they pass the thresholds.
+    fn measure<'a>(&self, members: impl Iterator<Item = &'a Surface>, ground: &GroundPlane) -> Option<Obstacle> {
+        let mut all = Scatter::default();
+        let mut count = 0u16;
+        let (mut min_m, mut max_m) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for surface in members {
+            let points = &surface.points;
+            all = all.joined(points);
+            count = count.saturating_add(1);
+            let height = ground.height_m(points.mean_m);
+            let middle = [points.mean_m[0], points.mean_m[1], height];
+            let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], ground.normal];
+            for i in 0..3 {
+                let half = HALF_LENGTH * libm::sqrtf(points.variance_along(axes[i]));
+                min_m[i] = min_m[i].min(middle[i] - half);
+                max_m[i] = max_m[i].max(middle[i] + half);
+            }
+        }
+        let (orientation_rad, length_m) = orientation(&all.covariance);
+        let obstacle = Obstacle {
+            mean_m: all.mean_m,
+            min_m,
+            max_m,
+            orientation_rad,
+            length_m,
+            pixels: all.weight as u32,
+            surfaces: count,
+        };
+        let high = max_m[2] >= self.settings.min_height_m && min_m[2] <= self.settings.clearance_m;
+        let large = length_m.max(max_m[2] - min_m[2]) >= self.settings.min_size_m;
+        (high && large && obstacle.pixels >= u32::from(self.settings.min_pixels)).then_some(obstacle)
+    }
+}
+
+impl Default for ObstacleFinder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Direction and length of the largest extent on the ground: the largest eigenvector of the covariance of x and y.
+fn orientation(covariance: &SymmetricMatrix3) -> (f32, f32) {
+    let (a, b, c) = (covariance.xx, covariance.xy, covariance.yy);
+    let half_difference = 0.5 * (a - c);
+    let radius = libm::sqrtf(half_difference * half_difference + b * b);
+    let largest = (0.5 * (a + c) + radius).max(0.0);
+    (0.5 * libm::atan2f(b, half_difference), 2.0 * HALF_LENGTH * libm::sqrtf(largest))
+}
+
+/// Inserts by distance; returns how many had to go.
+fn insert<const N: usize>(obstacles: &mut Vec<Obstacle, N, u16>, obstacle: Obstacle) -> u32 {
+    let distance = obstacle.distance_m();
+    let place = obstacles.iter().position(|other| other.distance_m() > distance).unwrap_or(obstacles.len());
+    let full = obstacles.is_full();
+    if full {
+        if place == obstacles.len() {
+            return 1;
+        }
+        obstacles.pop();
+    }
+    // Cannot fail: there is room now, and the place lies within the list.
+    let _ = obstacles.insert(place, obstacle);
+    u32::from(full)
 }

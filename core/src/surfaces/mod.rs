@@ -1,10 +1,32 @@
-//! Surfaces: contiguous pieces of the disparity picture inside 32 x 32 tiles.
+//! Surfaces: contiguous pieces of the disparity picture inside 32 x 32 tiles, and the plane through each.
+
+mod join;
+mod moments;
+mod settings;
+mod tile;
+
+pub use join::Regions;
+pub use settings::SurfaceSettings;
+
+use heapless::Vec;
+
+use crate::{
+    disparity::{DisparityPicture, DisparityPixel},
+    error::{ConfigError, ConfigProblem},
+    geometry::{DepthTable, Rays},
+    planes::Scatter,
+};
+use moments::{Moments, RowMoments};
+use tile::{MAX_SURFACES, Tile, TileUnion};
+
+/// Edge of a tile, px. The paper, section 4.4.
+pub const TILE: usize = 32;
 
 /// What a surface is taken for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SurfaceClass {
-    /// Too few points, or no plane fits them.
+    /// No plane fits: the points lie on a line or in a ball.
     #[default]
     Undefined,
     /// Near-horizontal, and on the ground.
@@ -13,7 +35,7 @@ pub enum SurfaceClass {
     Horizontal,
     /// Between horizontal and vertical.
     Slanted,
-    /// Near-vertical, but below the thresholds of an obstacle.
+    /// Near-vertical, but not part of an obstacle that passes the thresholds.
     Vertical,
     /// Part of an obstacle.
     Obstacle,
@@ -22,22 +44,18 @@ pub enum SurfaceClass {
 /// One surface and the plane through it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// Number of pixels.
-    pub pixels: u16,
-    /// What it is taken for.
-    pub class: SurfaceClass,
-    /// Mean of its points in the vehicle frame, metres.
-    pub mean_m: [f32; 3],
-    /// Covariance of its points in the vehicle frame, m^2: xx, xy, xz, yy, yz, zz.
-    pub covariance: [f32; 6],
+    /// Its points in the vehicle frame; the weight is their number.
+    pub points: Scatter,
     /// Unit normal in the vehicle frame, upward; zero where no plane fits.
     pub normal: [f32; 3],
+    /// What it is taken for.
+    pub class: SurfaceClass,
 }
 
 impl Surface {
     /// Absolute dot product of the normal with the vehicle's +Z: 1 on level ground, 0 on a wall. The paper, section 4.4.
     pub fn dot(&self) -> f32 {
-        self.normal[2].abs()
+        self.normal[2].abs().min(1.0)
     }
 
     /// `sqrt(1 - dot^2)`: 0 on level ground, 1 on a wall. The paper, section 4.4.
@@ -45,27 +63,294 @@ impl Surface {
         let dot = self.dot();
         libm::sqrtf((1.0 - dot * dot).max(0.0))
     }
-}
 
-/// Edge of a tile, px. The paper, section 4.4.
-pub const TILE: usize = 32;
-
-/// Settings of the surfaces and their classes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct SurfaceSettings {
-    /// Neighbours belong to the same surface if their disparities differ by no more, 1/16 px.
-    pub step_sixteenths: u16,
-    /// Surfaces of fewer pixels are left out: no plane through them means anything.
-    pub min_pixels: u16,
-    /// Surfaces within this angle of horizontal may be ground, degrees. The paper, section 4.4: 30.
-    pub horizontal_deg: f32,
-    /// Surfaces steeper than this are vertical, degrees; what lies between is for its height to decide.
-    pub vertical_deg: f32,
-}
-
-impl Default for SurfaceSettings {
-    fn default() -> Self {
-        Self { step_sixteenths: 16, min_pixels: 24, horizontal_deg: 30.0, vertical_deg: 45.0 }
+    /// Number of pixels.
+    pub fn pixels(&self) -> u32 {
+        self.points.weight as u32
     }
 }
+
+/// How many surfaces were found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SurfaceReport {
+    /// Surfaces with enough pixels.
+    pub found: u32,
+    /// Those among them that the table had no room for: the smallest.
+    pub dropped: u32,
+}
+
+/// Finds the surfaces of a disparity picture of up to `PIXELS` pixels, up to `SURFACES` of them.
+///
+/// Source: the paper, section 4.4. Splitting into tiles keeps an object from melting into the ground that it stands on.
+///
+/// # Bound
+/// Five passes of `width x height` steps, and an eigen-solution for each surface.
+pub struct Surfaces<const PIXELS: usize, const SURFACES: usize> {
+    settings: SurfaceSettings,
+    width: usize,
+    height: usize,
+    /// Number of the surface of each pixel within its tile, from 1; 0 where there is none.
+    labels: [u8; PIXELS],
+    union: TileUnion,
+    moments: [Moments; MAX_SURFACES],
+    shifts: [u8; MAX_SURFACES],
+    /// Place of each tile's first surface in the table.
+    tiles: Vec<u16, SURFACES, u16>,
+    table: Vec<Surface, SURFACES, u16>,
+}
+
+impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
+    /// A stage that is not configured and finds nothing.
+    pub const fn new() -> Self {
+        const { assert!(SURFACES < u16::MAX as usize, "places in the table must fit 16 bits") };
+        Self {
+            settings: SurfaceSettings::UNSET,
+            width: 0,
+            height: 0,
+            labels: [0; PIXELS],
+            union: TileUnion::new(),
+            moments: [Moments::ZERO; MAX_SURFACES],
+            shifts: [0; MAX_SURFACES],
+            tiles: Vec::new(),
+            table: Vec::new(),
+        }
+    }
+
+    /// Takes settings and the size of the pictures.
+    ///
+    /// # Errors
+    /// The first setting that cannot be used, named `surfaces.*`, or a picture that is too large.
+    pub fn configure(&mut self, settings: &SurfaceSettings, width: usize, height: usize) -> Result<(), ConfigError> {
+        settings.check()?;
+        let capacity = |field, needed: usize, capacity: usize| {
+            let error = ConfigError::new(field, ConfigProblem::OverCapacity { needed, capacity });
+            if needed > capacity { Err(error) } else { Ok(()) }
+        };
+        capacity("calibration.width x calibration.height", width.saturating_mul(height), PIXELS)?;
+        capacity("tiles of the picture", width.div_ceil(TILE) * height.div_ceil(TILE), SURFACES)?;
+        self.settings = *settings;
+        self.width = width;
+        self.height = height;
+        self.tiles.clear();
+        self.table.clear();
+        Ok(())
+    }
+
+    /// Finds the surfaces of `picture`, which must have the configured size, and fits a plane to each.
+    pub fn run<const DISPARITIES: usize>(
+        &mut self,
+        picture: DisparityPicture<'_>,
+        depth: &DepthTable<DISPARITIES>,
+        rays: &Rays,
+    ) -> SurfaceReport {
+        self.tiles.clear();
+        self.table.clear();
+        if (picture.width(), picture.height()) != (self.width, self.height) {
+            return SurfaceReport::default();
+        }
+        let pixels = picture.pixels();
+        let mut found = 0;
+        for tile in Tile::all(self.width, self.height) {
+            let SurfaceSettings { step_sixteenths, min_pixels, .. } = self.settings;
+            let covers = |steps| depth.inverse(steps) != 0;
+            let labels = &mut self.labels[..];
+            found += u32::from(self.union.label(pixels, self.width, tile, step_sixteenths, min_pixels, covers, labels));
+        }
+        let mut keep = KeepRule::everything();
+        if found as usize > SURFACES {
+            keep = self.keep_largest();
+        }
+        for tile in Tile::all(self.width, self.height) {
+            let first = self.table.len() as u16;
+            // Cannot fail: `configure` made sure that there is room for every tile.
+            let _ = self.tiles.push(first);
+            self.measure(pixels, tile, depth, rays, &mut keep);
+        }
+        SurfaceReport { found, dropped: found - self.table.len() as u32 }
+    }
+
+    /// The surfaces, tile by tile.
+    pub fn table(&self) -> &[Surface] {
+        &self.table
+    }
+
+    /// The surfaces, to be given a class.
+    pub fn table_mut(&mut self) -> &mut [Surface] {
+        &mut self.table
+    }
+
+    /// Place in the table of the surface at pixel `(x, y)`.
+    pub fn place_at(&self, x: usize, y: usize) -> Option<usize> {
+        if x >= self.width || y >= self.height {
+            return None;
+        }
+        let label = usize::from(*self.labels.get(y * self.width + x)?);
+        let tile = y / TILE * self.width.div_ceil(TILE) + x / TILE;
+        let first = usize::from(*self.tiles.get(tile)?);
+        label.checked_sub(1).map(|label| first + label)
+    }
+
+    /// The surface at pixel `(x, y)`.
+    pub fn surface_at(&self, x: usize, y: usize) -> Option<&Surface> {
+        self.table.get(self.place_at(x, y)?)
+    }
+
+    /// Numbers of the surfaces along row `y` within their tiles, from 1; 0 where there is none.
+    pub(crate) fn labels_row(&self, y: usize) -> &[u8] {
+        &self.labels[y * self.width..(y + 1) * self.width]
+    }
+
+    /// Place in the table of the first surface of the tile at `(x, y)`.
+    pub(crate) fn first_of_tile(&self, x: usize, y: usize) -> usize {
+        let tile = y / TILE * self.width.div_ceil(TILE) + x / TILE;
+        self.tiles.get(tile).map_or(0, |&first| usize::from(first))
+    }
+
+    /// Settings in force.
+    pub(crate) const fn settings(&self) -> &SurfaceSettings {
+        &self.settings
+    }
+
+    /// The size from which on the table has room for all surfaces.
+    fn keep_largest(&mut self) -> KeepRule {
+        // Sizes are counted from the largest down; the union's counters are free now.
+        let by_size = self.union.scratch();
+        by_size.fill(0);
+        for tile in Tile::all(self.width, self.height) {
+            let mut pixels = [0u16; MAX_SURFACES];
+            for y in tile.y..tile.y + tile.height {
+                for &label in &self.labels[y * self.width + tile.x..][..tile.width] {
+                    if let Some(pixels) = usize::from(label).checked_sub(1).and_then(|i| pixels.get_mut(i)) {
+                        *pixels += 1;
+                    }
+                }
+            }
+            for &pixels in pixels.iter().filter(|&&pixels| pixels > 0) {
+                let count = &mut by_size[usize::from(pixels) - 1];
+                *count = count.saturating_add(1);
+            }
+        }
+        let mut room = SURFACES;
+        for (i, &count) in by_size.iter().enumerate().rev() {
+            if usize::from(count) > room {
+                return KeepRule { at_least: i as u16 + 1, of_smallest: room as u16 };
+            }
+            room -= usize::from(count);
+        }
+        KeepRule::everything()
+    }
+
+    /// Measures the surfaces of one tile and appends them to the table.
+    fn measure<const DISPARITIES: usize>(
+        &mut self,
+        pixels: &[DisparityPixel],
+        tile: Tile,
+        depth: &DepthTable<DISPARITIES>,
+        rays: &Rays,
+        keep: &mut KeepRule,
+    ) {
+        let stride = self.width;
+        let row = |y: usize| (tile.y + y) * stride + tile.x..(tile.y + y) * stride + tile.x + tile.width;
+        // The farthest point of a surface decides how many bits its distances can keep.
+        let mut farthest = [0u32; MAX_SURFACES];
+        let mut count = 0;
+        for y in 0..tile.height {
+            for (pixel, &label) in pixels[row(y)].iter().zip(&self.labels[row(y)]) {
+                if let Some(farthest) = usize::from(label).checked_sub(1).and_then(|i| farthest.get_mut(i)) {
+                    *farthest = (*farthest).max(depth.inverse(pixel.steps()));
+                    count = count.max(usize::from(label));
+                }
+            }
+        }
+        for i in 0..count {
+            self.shifts[i] = (u32::BITS - farthest[i].leading_zeros()).saturating_sub(16) as u8;
+            self.moments[i] = Moments::ZERO;
+        }
+        let middle = (TILE / 2) as i32;
+        for y in 0..tile.height {
+            let v = y as i32 - middle;
+            let (mut current, mut sums) = (0u8, RowMoments::default());
+            for ((x, pixel), &label) in pixels[row(y)].iter().enumerate().zip(&self.labels[row(y)]) {
+                if label != current {
+                    if let Some(i) = usize::from(current).checked_sub(1) {
+                        self.moments[i].add(&sums, v);
+                    }
+                    (current, sums) = (label, RowMoments::default());
+                }
+                if let Some(i) = usize::from(label).checked_sub(1) {
+                    sums.add(depth.inverse(pixel.steps()) >> self.shifts[i], x as i32 - middle);
+                }
+            }
+            if let Some(i) = usize::from(current).checked_sub(1) {
+                self.moments[i].add(&sums, v);
+            }
+        }
+        let mut renumbered = [0u8; MAX_SURFACES];
+        let (mut kept, mut left_out) = (0u8, false);
+        let (u, v) = ((tile.x + TILE / 2) as f32, (tile.y + TILE / 2) as f32);
+        for i in 0..count {
+            let moments = &self.moments[i];
+            let unit_m = depth.scale_m() * (1u32 << self.shifts[i]) as f32;
+            let surface = self.classify(moments.scatter(rays, u, v, unit_m));
+            if keep.keeps(moments.pixels()) && self.table.push(surface).is_ok() {
+                kept += 1;
+                renumbered[i] = kept;
+            } else {
+                left_out = true;
+            }
+        }
+        if left_out {
+            for y in 0..tile.height {
+                for label in &mut self.labels[row(y)] {
+                    *label = usize::from(*label).checked_sub(1).and_then(|i| renumbered.get(i)).copied().unwrap_or(0);
+                }
+            }
+        }
+    }
+
+    /// Fits the plane and tells horizontal from vertical.
+    fn classify(&self, points: Scatter) -> Surface {
+        let Some((normal, _)) = points.plane() else {
+            return Surface { points, normal: [0.0; 3], class: SurfaceClass::Undefined };
+        };
+        let mut surface = Surface { points, normal, class: SurfaceClass::Slanted };
+        let dot = surface.dot();
+        if dot >= libm::cosf(self.settings.horizontal_deg.to_radians()) {
+            surface.class = SurfaceClass::Horizontal;
+        } else if dot <= libm::cosf(self.settings.vertical_deg.to_radians()) {
+            surface.class = SurfaceClass::Vertical;
+        }
+        surface
+    }
+}
+
+impl<const PIXELS: usize, const SURFACES: usize> Default for Surfaces<PIXELS, SURFACES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Which surfaces are kept when there are too many: all that are larger than a size, and as many of that size as there is
+/// room for, in the order of the tiles.
+struct KeepRule {
+    at_least: u16,
+    of_smallest: u16,
+}
+
+impl KeepRule {
+    const fn everything() -> Self {
+        Self { at_least: 0, of_smallest: u16::MAX }
+    }
+
+    fn keeps(&mut self, pixels: u16) -> bool {
+        if pixels == self.at_least {
+            let room = self.of_smallest > 0;
+            self.of_smallest = self.of_smallest.saturating_sub(1);
+            return room;
+        }
+        pixels > self.at_least
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,62 @@
+//! From disparity to distance by table.
+
+use super::RectifiedPair;
+
+/// Distances of all disparities of the search range.
+///
+/// Distances are kept as integers, `INVERSE_ONE / disparity` with the disparity in 1/16 px, so that sums of them are exact and
+/// the same on every processor; [`Self::scale_m`] turns them into metres.
+pub struct DepthTable<const DISPARITIES: usize> {
+    inverse: [[u32; 16]; DISPARITIES],
+    /// Disparity of the first entry, 1/16 px.
+    base_steps: u16,
+    scale_m: f32,
+}
+
+/// Inverse of a disparity of 1/16 px. At 128 px a step of 1/16 px still changes the inverse by 8.
+const INVERSE_ONE: f32 = (1 << 25) as f32;
+
+impl<const DISPARITIES: usize> DepthTable<DISPARITIES> {
+    /// An empty table: no disparity has a distance.
+    pub const fn new() -> Self {
+        Self { inverse: [[0; 16]; DISPARITIES], base_steps: 0, scale_m: 0.0 }
+    }
+
+    /// Fills the table for `disparities` disparities from `min_disparity` on. Disparities whose rays do not meet in front of
+    /// the camera have no distance.
+    ///
+    /// # Bound
+    /// `16 x DISPARITIES` steps.
+    pub fn configure(&mut self, pair: &RectifiedPair, min_disparity: u16, disparities: u16) {
+        self.base_steps = min_disparity.saturating_mul(16);
+        self.scale_m = 16.0 * pair.focal_px * pair.baseline_m / INVERSE_ONE;
+        let offset_steps = pair.disparity_offset_px * 16.0;
+        let used = usize::from(disparities) * 16;
+        for (i, entry) in self.inverse.as_flattened_mut().iter_mut().enumerate() {
+            let steps = f32::from(self.base_steps) + i as f32 + offset_steps;
+            *entry = if i < used && steps >= 1.0 { libm::roundf(INVERSE_ONE / steps) as u32 } else { 0 };
+        }
+    }
+
+    /// Distance along the optical axis at a disparity in 1/16 px, in units of [`Self::scale_m`]; 0 if it has none.
+    pub fn inverse(&self, steps: u16) -> u32 {
+        let place = steps.checked_sub(self.base_steps).map(usize::from);
+        place.and_then(|place| self.inverse.as_flattened().get(place)).copied().unwrap_or(0)
+    }
+
+    /// Distance along the optical axis at a disparity in 1/16 px, metres; 0 if it has none.
+    pub fn distance_m(&self, steps: u16) -> f32 {
+        self.inverse(steps) as f32 * self.scale_m
+    }
+
+    /// Metres in one unit of [`Self::inverse`].
+    pub const fn scale_m(&self) -> f32 {
+        self.scale_m
+    }
+}
+
+impl<const DISPARITIES: usize> Default for DepthTable<DISPARITIES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

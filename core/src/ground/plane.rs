@@ -1,0 +1,65 @@
+//! The ground as a plane.
+
+use crate::{geometry::VehicleFrame, planes::Scatter};
+
+/// The ground in the vehicle frame: points `p` with `normal . p = offset_m`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundPlane {
+    /// Unit normal, upward.
+    pub normal: [f32; 3],
+    /// Height of the plane at the origin along the normal, metres; 0 if the mount is right and the ground is level.
+    pub offset_m: f32,
+    /// Distance of the left camera from the plane, metres.
+    pub camera_height_m: f32,
+    /// Tilt of the optical axis below the plane, radians.
+    pub pitch_down_rad: f32,
+    /// Roll of the camera against the plane, radians; positive if the camera leans to the right.
+    pub roll_rad: f32,
+    /// Pixels that support it.
+    pub support: u32,
+    /// Root mean square distance of the points from the plane, metres.
+    pub rms_m: f32,
+    /// Frames since it was last seen; 0 if it was seen in this one.
+    pub age_frames: u16,
+}
+
+impl GroundPlane {
+    /// The plane through a set of points; `None` where they do not define one.
+    pub fn through(points: &Scatter, frame: &VehicleFrame) -> Option<Self> {
+        let (normal, variance) = points.plane()?;
+        Some(Self {
+            support: points.weight as u32,
+            rms_m: libm::sqrtf(variance),
+            ..Self::new(normal, dot(normal, points.mean_m), frame)
+        })
+    }
+
+    /// The plane that the mount promises: level, at the origin of the vehicle frame.
+    pub fn of_mount(frame: &VehicleFrame) -> Self {
+        Self::new([0.0, 0.0, 1.0], 0.0, frame)
+    }
+
+    fn new(normal: [f32; 3], offset_m: f32, frame: &VehicleFrame) -> Self {
+        let camera_m = frame.point([0.0; 3]);
+        let dip = |axis: [f32; 3]| libm::asinf((-dot(normal, frame.direction(axis))).clamp(-1.0, 1.0));
+        Self {
+            normal,
+            offset_m,
+            camera_height_m: dot(normal, camera_m) - offset_m,
+            pitch_down_rad: dip([0.0, 0.0, 1.0]),
+            roll_rad: dip([1.0, 0.0, 0.0]),
+            support: 0,
+            rms_m: 0.0,
+            age_frames: 0,
+        }
+    }
+
+    /// Height of a point of the vehicle frame above the plane, metres.
+    pub fn height_m(&self, p: [f32; 3]) -> f32 {
+        dot(self.normal, p) - self.offset_m
+    }
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,60 @@
+//! Settings of the ground plane.
+
+use crate::error::ConfigError;
+
+/// Settings of the ground plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct GroundSettings {
+    /// Largest tilt against the vehicle's horizontal, degrees.
+    pub max_tilt_deg: f32,
+    /// Largest difference between the height of the camera above the plane and that of the mount, metres, where the
+    /// height of the mount is known.
+    pub height_tolerance_m: f32,
+    /// A surface belongs to the ground if its middle lies within this distance of the plane, metres.
+    pub surface_tolerance_m: f32,
+    /// Allowance on top of it for each metre of range, metres: distances are less certain there, and the ground bends.
+    pub surface_tolerance_per_m: f32,
+    /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
+    pub min_support_permille: f32,
+    /// Frames for which the last plane is held when a frame has none.
+    pub hold_frames: u16,
+}
+
+impl GroundSettings {
+    /// All zero, for a stage that is not configured.
+    pub(super) const UNSET: Self = Self {
+        max_tilt_deg: 0.0,
+        height_tolerance_m: 0.0,
+        surface_tolerance_m: 0.0,
+        surface_tolerance_per_m: 0.0,
+        min_support_permille: 0.0,
+        hold_frames: 0,
+    };
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first value that cannot be used, named `ground.*`.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        ConfigError::check("ground.max_tilt_deg", self.max_tilt_deg, 0.0, 45.0)?;
+        ConfigError::check("ground.height_tolerance_m", self.height_tolerance_m, 0.0, 20.0)?;
+        ConfigError::check("ground.surface_tolerance_m", self.surface_tolerance_m, 0.001, 2.0)?;
+        ConfigError::check("ground.surface_tolerance_per_m", self.surface_tolerance_per_m, 0.0, 0.5)?;
+        ConfigError::check("ground.min_support_permille", self.min_support_permille, 0.0, 1000.0)?;
+        ConfigError::check("ground.hold_frames", f32::from(self.hold_frames), 0.0, 1000.0)
+    }
+}
+
+impl Default for GroundSettings {
+    fn default() -> Self {
+        Self {
+            max_tilt_deg: 20.0,
+            height_tolerance_m: 0.5,
+            surface_tolerance_m: 0.08,
+            surface_tolerance_per_m: 0.01,
+            min_support_permille: 5.0,
+            hold_frames: 10,
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! From classified surfaces to cells.
+
+use super::{Cell, CellState, MapSettings, ObstacleMap, UnknownReason, shadow};
+use crate::{
+    disparity::{DisparityPicture, Reason},
+    error::ConfigError,
+    geometry::{DepthTable, Rays, RectifiedPair, VehicleFrame},
+    ground::GroundPlane,
+    surfaces::{SurfaceClass, Surfaces, TILE},
+};
+
+/// How the left camera sees the world.
+#[derive(Clone, Copy)]
+pub struct View<'a, const DISPARITIES: usize> {
+    /// The rectified pair.
+    pub pair: &'a RectifiedPair,
+    /// Where the left camera sits.
+    pub frame: &'a VehicleFrame,
+    /// Rays of the left camera.
+    pub rays: &'a Rays,
+    /// Distances of the search range.
+    pub depth: &'a DepthTable<DISPARITIES>,
+    /// Nearest distance along the optical axis that the search range reaches, metres.
+    pub nearest_m: f32,
+}
+
+/// What the pixels say of one cell.
+#[derive(Clone, Copy, Debug, Default)]
+struct Evidence {
+    /// Pixels of obstacles between the least height and the clearance.
+    obstacle: u16,
+    /// Pixels of surfaces on the ground.
+    ground: u16,
+    /// Other pixels too high for a free cell.
+    unclear: u16,
+    /// Greatest height of an obstacle pixel, decimetres.
+    height_dm: u8,
+}
+
+/// What a pixel counts as, once for each run of pixels of one surface.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Nothing,
+    Ground,
+    Obstacle,
+    Other,
+}
+
+/// Turns the points of surfaces into cells.
+///
+/// Source: the paper, section 4.4, last step. A pixel is a vote; how many votes a cell needs follows from its distance, because
+/// the same piece of ground or obstacle covers fewer pixels far away.
+///
+/// # Bound
+/// One pass of `width x height` steps, one of `CELLS`.
+pub struct MapBuilder<const CELLS: usize> {
+    settings: MapSettings,
+    obstacle_heights_m: (f32, f32),
+    evidence: [Evidence; CELLS],
+}
+
+impl<const CELLS: usize> MapBuilder<CELLS> {
+    /// A stage that is not configured.
+    pub const fn new() -> Self {
+        const NOTHING: Evidence = Evidence { obstacle: 0, ground: 0, unclear: 0, height_dm: 0 };
+        Self { settings: MapSettings::UNSET, obstacle_heights_m: (0.0, 0.0), evidence: [NOTHING; CELLS] }
+    }
+
+    /// Takes settings, and the least height and the clearance of obstacles, metres.
+    ///
+    /// # Errors
+    /// The first setting that cannot be used, named `map.*`.
+    pub fn configure(&mut self, settings: &MapSettings, obstacle_heights_m: (f32, f32)) -> Result<(), ConfigError> {
+        settings.check(CELLS)?;
+        self.settings = *settings;
+        self.obstacle_heights_m = obstacle_heights_m;
+        Ok(())
+    }
+
+    /// Fills `map`. Without a ground plane nothing is free, and obstacles are measured from the plane of the mount.
+    pub fn run<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
+        &mut self,
+        surfaces: &Surfaces<PIXELS, SURFACES>,
+        picture: DisparityPicture<'_>,
+        view: &View<'_, DISPARITIES>,
+        ground: &GroundPlane,
+        ground_seen: bool,
+        map: &mut ObstacleMap<CELLS>,
+    ) {
+        let geometry = self.settings.geometry;
+        self.evidence[..geometry.len()].fill(Evidence::default());
+        for y in 0..picture.height() {
+            for x in (0..picture.width()).step_by(TILE) {
+                self.collect(surfaces, picture, view, ground, (x, y));
+            }
+        }
+        map.geometry = geometry;
+        map.cells.clear();
+        for index in 0..geometry.len() {
+            let cell = self.decide(index, picture, view, ground, ground_seen);
+            // Cannot fail: `configure` made sure that there is room.
+            let _ = map.cells.push(cell);
+        }
+        shadow::mark(map);
+    }
+
+    /// Collects the votes of one row of one tile.
+    fn collect<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
+        &mut self,
+        surfaces: &Surfaces<PIXELS, SURFACES>,
+        picture: DisparityPicture<'_>,
+        view: &View<'_, DISPARITIES>,
+        ground: &GroundPlane,
+        (x0, y): (usize, usize),
+    ) {
+        let end = (x0 + TILE).min(picture.width());
+        let labels = &surfaces.labels_row(y)[x0..end];
+        if labels.iter().all(|&label| label == 0) {
+            return;
+        }
+        let first = surfaces.first_of_tile(x0, y);
+        let table = surfaces.table();
+        let (min_height, clearance) = self.obstacle_heights_m;
+        let per_cell = 1.0 / self.settings.geometry.cell_size_m();
+        let camera_height = ground.height_m(view.rays.origin_m);
+        let mut direction = view.rays.direction(x0 as f32, y as f32);
+        let step = view.rays.along_row;
+        let rise = |d: [f32; 3]| d[0] * ground.normal[0] + d[1] * ground.normal[1] + d[2] * ground.normal[2];
+        let (mut climb, climb_step) = (rise(direction), rise(step));
+        let (mut current, mut role) = (0, Role::Nothing);
+        for (pixel, &label) in picture.row(y)[x0..end].iter().zip(labels) {
+            if label != current {
+                current = label;
+                let class = usize::from(label).checked_sub(1).and_then(|i| table.get(first + i)).map(|s| s.class);
+                role = match class {
+                    None => Role::Nothing,
+                    Some(SurfaceClass::Ground) => Role::Ground,
+                    Some(SurfaceClass::Obstacle) => Role::Obstacle,
+                    Some(_) => Role::Other,
+                };
+            }
+            if role != Role::Nothing {
+                let z = view.depth.distance_m(pixel.steps());
+                let height = camera_height + z * climb;
+                let cell = (
+                    floor((view.rays.origin_m[0] + z * direction[0]) * per_cell),
+                    floor((view.rays.origin_m[1] + z * direction[1]) * per_cell),
+                );
+                if let Some(evidence) = self.settings.geometry.index(cell.0, cell.1).map(|i| &mut self.evidence[i]) {
+                    let too_high = height > self.settings.free_max_height_m;
+                    match role {
+                        Role::Obstacle if height >= min_height && height <= clearance => {
+                            evidence.obstacle = evidence.obstacle.saturating_add(1);
+                            evidence.height_dm = evidence.height_dm.max((height * 10.0) as u8);
+                        }
+                        Role::Ground if !too_high => evidence.ground = evidence.ground.saturating_add(1),
+                        _ if too_high && height <= clearance => evidence.unclear = evidence.unclear.saturating_add(1),
+                        _ => {}
+                    }
+                }
+            }
+            for i in 0..3 {
+                direction[i] += step[i];
+            }
+            climb += climb_step;
+        }
+    }
+
+    /// What the votes make of a cell.
+    fn decide<const DISPARITIES: usize>(
+        &self,
+        index: usize,
+        picture: DisparityPicture<'_>,
+        view: &View<'_, DISPARITIES>,
+        ground: &GroundPlane,
+        ground_seen: bool,
+    ) -> Cell {
+        let geometry = self.settings.geometry;
+        let (i, j) = geometry.cell_at(index);
+        let (x, y) = geometry.centre_m(i, j);
+        let evidence = self.evidence[index];
+        let unknown = |reason| Cell { state: CellState::Unknown(reason), ..Cell::default() };
+        let seen = Sight::of_ground(x, y, view, ground);
+        if x * x + y * y > self.settings.max_range_m * self.settings.max_range_m {
+            return unknown(UnknownReason::TooFar);
+        }
+        let Some(seen) = seen else { return unknown(UnknownReason::OutsideView) };
+        // Pixels that a metre takes at this distance, across and, foreshortened, along the ground.
+        let per_m = view.pair.focal_px / seen.distance_m;
+        let across = geometry.cell_size_m() * per_m;
+        let along = across * (ground.camera_height_m / seen.distance_m).min(1.0);
+        let obstacle_area = across * self.obstacle_heights_m.0 * per_m;
+        let need_obstacle =
+            (self.settings.obstacle_cover * obstacle_area).max(f32::from(self.settings.obstacle_min_pixels));
+        let need_free = (self.settings.free_cover * across * along).max(f32::from(self.settings.free_min_pixels));
+        if f32::from(evidence.obstacle) >= need_obstacle {
+            return Cell { state: CellState::Obstacle, pixels: evidence.obstacle, height_dm: evidence.height_dm };
+        }
+        let against = f32::from(evidence.obstacle) + f32::from(evidence.unclear);
+        if ground_seen && f32::from(evidence.ground) >= need_free && against < 0.5 * need_obstacle {
+            return Cell { state: CellState::Free, pixels: evidence.ground, height_dm: 0 };
+        }
+        unknown(match seen.pixel {
+            None => UnknownReason::OutsideView,
+            Some(_) if seen.distance_m < view.nearest_m => UnknownReason::TooNear,
+            Some(_) if !ground_seen => UnknownReason::NoGround,
+            Some((u, v)) => match picture.row(v)[u].get() {
+                Ok(_) => UnknownReason::TooFewPixels,
+                Err(Reason::LowTexture | Reason::Saturated) => UnknownReason::LowTexture,
+                Err(_) => UnknownReason::NoMatch,
+            },
+        })
+    }
+}
+
+impl<const CELLS: usize> Default for MapBuilder<CELLS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// How the camera sees a point on the ground.
+struct Sight {
+    /// Distance along the optical axis, metres.
+    distance_m: f32,
+    /// Pixel, if it lies in the picture.
+    pixel: Option<(usize, usize)>,
+}
+
+impl Sight {
+    /// Looks at the ground at `(x, y)` of the vehicle frame; `None` if it lies behind the camera.
+    fn of_ground<const DISPARITIES: usize>(
+        x: f32,
+        y: f32,
+        view: &View<'_, DISPARITIES>,
+        ground: &GroundPlane,
+    ) -> Option<Self> {
+        let [nx, ny, nz] = ground.normal;
+        let z = if nz.abs() > 1.0e-3 { (ground.offset_m - nx * x - ny * y) / nz } else { 0.0 };
+        let origin = view.rays.origin_m;
+        let [right, down, distance_m] = view.frame.to_camera([x - origin[0], y - origin[1], z - origin[2]]);
+        if distance_m <= 0.0 {
+            return None;
+        }
+        let per_m = view.pair.focal_px / distance_m;
+        let (u, v) = (view.pair.cx + right * per_m, view.pair.cy + down * per_m);
+        let inside = u >= 0.0 && v >= 0.0 && u < view.pair.width as f32 && v < view.pair.height as f32;
+        Some(Self { distance_m, pixel: inside.then_some((u as usize, v as usize)) })
+    }
+}
+
+/// Largest whole number not above `x`, within i16.
+fn floor(x: f32) -> i16 {
+    let whole = x as i16;
+    if f32::from(whole) > x { whole.saturating_sub(1) } else { whole }
+}

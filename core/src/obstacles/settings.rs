@@ -1,0 +1,39 @@
+//! Settings of the obstacles.
+
+use crate::error::ConfigError;
+
+/// Settings of the obstacles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct ObstacleSettings {
+    /// An obstacle reaches at least this height above the ground, metres. The paper, section 4.1: 0.25.
+    pub min_height_m: f32,
+    /// What begins above this height can be driven under, metres.
+    pub clearance_m: f32,
+    /// An obstacle has at least this many pixels.
+    pub min_pixels: u16,
+    /// An obstacle is at least this long, wide or high, metres.
+    pub min_size_m: f32,
+}
+
+impl ObstacleSettings {
+    /// All zero, for a stage that is not configured.
+    pub(super) const UNSET: Self = Self { min_height_m: 0.0, clearance_m: 0.0, min_pixels: 0, min_size_m: 0.0 };
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first value that cannot be used, named `obstacles.*`.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        ConfigError::check("obstacles.min_height_m", self.min_height_m, 0.02, 5.0)?;
+        ConfigError::check("obstacles.clearance_m", self.clearance_m, self.min_height_m, 20.0)?;
+        ConfigError::check("obstacles.min_pixels", f32::from(self.min_pixels), 0.0, 10_000.0)?;
+        ConfigError::check("obstacles.min_size_m", self.min_size_m, 0.0, 5.0)
+    }
+}
+
+impl Default for ObstacleSettings {
+    fn default() -> Self {
+        Self { min_height_m: 0.25, clearance_m: 2.2, min_pixels: 40, min_size_m: 0.15 }
+    }
+}
