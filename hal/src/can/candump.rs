@@ -1,0 +1,178 @@
+//! The log format of candump (`candump -L`, can-utils): `(1436509053.249713) can0 4AA#0102`.
+
+use std::io::Write;
+
+use super::{CanBus, CanFrame, FrameParseError};
+
+/// Longest line that is read, bytes: an FD frame with 64 bytes has under 200.
+const MAX_LINE: usize = 512;
+
+/// A line of a log: a frame, when and on which bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CandumpLine {
+    /// When the frame was on the bus, nanoseconds; the log has microseconds.
+    pub timestamp_ns: u64,
+    /// Name of the interface.
+    pub interface: String,
+    /// The frame.
+    pub frame: CanFrame,
+}
+
+/// A line of a log that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CandumpError {
+    /// Line, from 1.
+    pub line: usize,
+    /// What is wrong with it.
+    pub problem: CandumpProblem,
+}
+
+/// What is wrong with a line of a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CandumpProblem {
+    /// Not text, or too long for a line of a log.
+    NotText,
+    /// No time `(seconds.microseconds)` at the beginning.
+    Time,
+    /// Not three words: time, interface, frame.
+    Words,
+    /// The frame.
+    Frame(FrameParseError),
+}
+
+/// Writes every frame that is sent to a log and passes it on to the bus behind.
+///
+/// A frame that the bus refuses is not in the log.
+#[derive(Debug)]
+pub struct CandumpWriter<W, B> {
+    log: W,
+    bus: B,
+    interface: String,
+}
+
+/// What can go wrong on a bus with a log.
+#[derive(Debug)]
+pub enum LoggedBusError<E> {
+    /// The bus.
+    Bus(E),
+    /// The log cannot be written; the frame was sent.
+    Log(std::io::Error),
+}
+
+impl std::fmt::Display for CandumpLine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let micros = self.timestamp_ns / 1_000;
+        let (seconds, micros) = (micros / 1_000_000, micros % 1_000_000);
+        write!(f, "({seconds:010}.{micros:06}) {} {}", self.interface, self.frame)
+    }
+}
+
+impl std::str::FromStr for CandumpLine {
+    type Err = CandumpProblem;
+
+    fn from_str(text: &str) -> Result<Self, CandumpProblem> {
+        let mut words = text.split_ascii_whitespace();
+        let timestamp_ns = words.next().and_then(time_ns).ok_or(CandumpProblem::Time)?;
+        let interface = words.next().ok_or(CandumpProblem::Words)?.to_owned();
+        let frame = words.next().ok_or(CandumpProblem::Words)?.parse().map_err(CandumpProblem::Frame)?;
+        // Newer versions of candump add the direction: `T` or `R`.
+        match words.next() {
+            None | Some("T" | "R") => Ok(Self { timestamp_ns, interface, frame }),
+            Some(_) => Err(CandumpProblem::Words),
+        }
+    }
+}
+
+/// The lines of a log, one after another; empty lines and lines that begin with `#` or `;` are passed over.
+///
+/// The reader goes on behind a line that is wrong.
+pub fn parse_candump(log: &[u8]) -> impl Iterator<Item = Result<CandumpLine, CandumpError>> {
+    log.split(|byte| *byte == b'\n').enumerate().filter_map(|(index, line)| {
+        let line = line.trim_ascii();
+        if line.is_empty() || line.starts_with(b"#") || line.starts_with(b";") {
+            return None;
+        }
+        let text = std::str::from_utf8(line).ok().filter(|text| text.len() <= MAX_LINE);
+        let parsed = text.ok_or(CandumpProblem::NotText).and_then(str::parse);
+        Some(parsed.map_err(|problem| CandumpError { line: index + 1, problem }))
+    })
+}
+
+impl<W: Write, B: CanBus> CandumpWriter<W, B> {
+    /// Logs to `log` what is sent on `bus`, under the name `interface` (`can0`).
+    pub fn new(log: W, bus: B, interface: impl Into<String>) -> Self {
+        Self { log, bus, interface: interface.into() }
+    }
+
+    /// The log and the bus, flushed.
+    ///
+    /// # Errors
+    /// When the last lines cannot be written.
+    pub fn into_inner(mut self) -> std::io::Result<(W, B)> {
+        self.log.flush()?;
+        Ok((self.log, self.bus))
+    }
+}
+
+impl<W: Write, B: CanBus> CanBus for CandumpWriter<W, B> {
+    type Error = LoggedBusError<B::Error>;
+
+    fn send(&mut self, frame: &CanFrame, now_ns: u64) -> Result<(), Self::Error> {
+        self.bus.send(frame, now_ns).map_err(LoggedBusError::Bus)?;
+        let line = CandumpLine { timestamp_ns: now_ns, interface: self.interface.clone(), frame: *frame };
+        writeln!(self.log, "{line}").map_err(LoggedBusError::Log)
+    }
+
+    fn receive(&mut self) -> Result<Option<(u64, CanFrame)>, Self::Error> {
+        self.bus.receive().map_err(LoggedBusError::Bus)
+    }
+}
+
+impl<E: std::fmt::Display> std::fmt::Display for LoggedBusError<E> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Bus(error) => error.fmt(f),
+            Self::Log(error) => write!(f, "the CAN log cannot be written ({error}); check the space on the disk"),
+        }
+    }
+}
+
+impl<E: std::error::Error + 'static> std::error::Error for LoggedBusError<E> {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Bus(error) => Some(error),
+            Self::Log(error) => Some(error),
+        }
+    }
+}
+
+impl std::fmt::Display for CandumpError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "line {}: {}; a line is `(seconds.microseconds) interface id#data`", self.line, self.problem)
+    }
+}
+
+impl std::error::Error for CandumpError {}
+
+impl std::fmt::Display for CandumpProblem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NotText => write!(f, "not text, or longer than {MAX_LINE} bytes"),
+            Self::Time => write!(f, "does not begin with a time"),
+            Self::Words => write!(f, "is not time, interface and frame"),
+            Self::Frame(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for CandumpProblem {}
+
+fn time_ns(word: &str) -> Option<u64> {
+    let (seconds, fraction) = word.strip_prefix('(')?.strip_suffix(')')?.split_once('.')?;
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    if !digits(seconds) || !digits(fraction) || fraction.len() > 9 {
+        return None;
+    }
+    let nanos: u64 = format!("{fraction:0<9}").parse().ok()?;
+    seconds.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos)
+}
