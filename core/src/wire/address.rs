@@ -115,7 +115,7 @@ impl Message {
     }
 
     /// Number of data bytes.
-    pub const fn len(self) -> usize {
+    pub const fn data_len(self) -> usize {
         if self.is_fd() { 24 } else { 8 }
     }
 

@@ -134,7 +134,7 @@ impl Counters {
     pub(super) fn frame(&mut self, message: Message, emit: impl FnOnce(&mut [u8])) -> Frame {
         let id = self.address.id(message);
         let mut data = [0; MAX_DATA];
-        if let Some(data) = data.get_mut(..message.len()) {
+        if let Some(data) = data.get_mut(..message.data_len()) {
             emit(data);
             if let Some(counter) = self.next.get_mut(message as usize) {
                 protect(id.as_raw(), *counter, data);

@@ -32,7 +32,7 @@ impl Frame {
 
     /// The frame of a message whose bytes are complete; bytes behind its length are not sent.
     pub(super) const fn of_message(id: StandardId, message: Message, data: [u8; MAX_DATA]) -> Self {
-        Self { id, len: message.len() as u8, fd: message.is_fd(), data }
+        Self { id, len: message.data_len() as u8, fd: message.is_fd(), data }
     }
 
     /// The identifier.

@@ -1,16 +1,20 @@
 //! The wire: what goes over the CAN bus, sending and receiving.
 
 mod address;
+mod assembly;
+mod command;
 mod config;
 mod encoder;
 mod frame;
 mod load;
 mod message;
 mod protect;
+mod receiver;
 mod select;
 mod signal;
 
 pub use address::{Address, BaseId, Message, NodeId};
+pub use command::{Command, CommandEncoder, CommandReceiver, CommandStatistics};
 pub use config::{FrameFormat, WireConfig, WireSettings, check_geometry};
 pub use encoder::{EncodeReport, OutputFull, Scan, ScanEncoder, Status};
 pub use frame::{Frame, MAX_DATA};
@@ -26,5 +30,8 @@ pub use message::{
 pub use protect::{
     COUNTER, COUNTER_VALUES, CRC, CounterCheck, DATA_ID_NIBBLE, Packet, PacketError, ScanCrc, Step, next_counter,
     protect,
+};
+pub use receiver::{
+    Abandoned, NoScan, ReceiveError, Received, ReceivedScan, ReceiverConfig, ReceiverStatistics, ScanReceiver,
 };
 pub use signal::Signal;

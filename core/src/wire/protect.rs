@@ -67,8 +67,8 @@ impl<'a> Packet<'a> {
     }
 
     fn check_message(message: Message, data_id: u16, data: &'a [u8]) -> Result<Self, PacketError> {
-        if data.len() != message.len() {
-            return Err(PacketError::WrongLength { expected: message.len(), found: data.len() });
+        if data.len() != message.data_len() {
+            return Err(PacketError::WrongLength { expected: message.data_len(), found: data.len() });
         }
         if CRC.get(data) != u32::from(checksum(data_id, data)) {
             return Err(PacketError::WrongCrc);
@@ -257,9 +257,9 @@ mod tests {
     fn every_error_of_one_or_two_bits_is_caught_in_every_message() {
         let address = Address { base: BaseId::new(0x600).unwrap(), node: NodeId::new(5).unwrap() };
         for message in Message::ALL {
-            let (id, bits) = (address.id(message), message.len() * 8);
+            let (id, bits) = (address.id(message), message.data_len() * 8);
             let mut data = [0; 24];
-            let data = &mut data[..message.len()];
+            let data = &mut data[..message.data_len()];
             data.iter_mut().enumerate().for_each(|(i, byte)| *byte = (i as u8).wrapping_mul(73));
             protect(id.as_raw(), 9, data);
             assert!(Packet::check(address, id, data).unwrap().is_ok());
@@ -301,14 +301,14 @@ mod tests {
         for message in Message::ALL {
             let id = address.id(message);
             for fill in [0x00, 0xFF] {
-                assert!(Packet::check(address, id, &[fill; 24][..message.len()]).unwrap().is_err());
+                assert!(Packet::check(address, id, &[fill; 24][..message.data_len()]).unwrap().is_err());
             }
-            for len in (0..=64).filter(|len| *len != message.len()) {
+            for len in (0..=64).filter(|len| *len != message.data_len()) {
                 let error = Packet::check(address, id, &[0; 64][..len]).unwrap().unwrap_err();
-                assert_eq!(error, PacketError::WrongLength { expected: message.len(), found: len });
+                assert_eq!(error, PacketError::WrongLength { expected: message.data_len(), found: len });
             }
             let mut data = [0x11; 24];
-            let data = &mut data[..message.len()];
+            let data = &mut data[..message.data_len()];
             protect(id.as_raw(), 0, data);
             COUNTER.put(data, 15);
             data[0] = checksum(id.as_raw(), data);

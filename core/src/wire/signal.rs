@@ -90,7 +90,7 @@ mod tests {
             for start in 0..=64 - size {
                 let signal = Signal::new(start, size);
                 let all = ((1_u64 << size) - 1) << start;
-                for (value, background) in [(signal.max(), 0_u64), (0, u64::MAX), (0x00A5_C3_5A & signal.max(), 0)] {
+                for (value, background) in [(signal.max(), 0_u64), (0, u64::MAX), (0x00A5_C35A & signal.max(), 0)] {
                     let mut data = background.to_le_bytes();
                     signal.put(&mut data, value);
                     // Plain 64-bit arithmetic as the oracle.
