@@ -3,7 +3,10 @@
 //! A recording has no clock of its own: the frames of a scan carry the time of exposure of its pictures and an age of zero,
 //! so that the same recording gives the same bytes every time.
 
-use std::io::Write as _;
+use std::{
+    io::Write as _,
+    time::{Duration, Instant},
+};
 
 use fencepost_core::{
     health::{Health, HealthLevel, HealthReason},
@@ -73,6 +76,8 @@ pub struct SentScan {
     pub cells: Vec<CellRow>,
     /// Known cells that found no room.
     pub dropped_cells: u32,
+    /// Time that making the frames took, without writing them.
+    pub encoding: Duration,
 }
 
 impl CanLog {
@@ -112,10 +117,12 @@ impl CanLog {
             ground: detection.ground.as_ref(),
         };
         self.frames.clear();
+        let start = Instant::now();
         let report = self
             .encoder
             .encode(&scan, self.frames.as_mut_view())
             .map_err(|error| Failure::work(format!("the scan cannot be sent: {error}")))?;
+        let encoding = start.elapsed();
         self.status = Status { state: NodeState::Running, health: view.health, last_scan: Some(scan_index) };
         if report.dropped_cells > 0 {
             self.status.health.raise(HealthReason::MapTruncated, HealthLevel::Degraded);
@@ -130,7 +137,7 @@ impl CanLog {
         self.counts.frames += frames;
         self.counts.most_frames_per_scan = self.counts.most_frames_per_scan.max(frames);
         self.counts.dropped_cells += u64::from(report.dropped_cells);
-        Ok(SentScan { cells: self.sent_cells(view), dropped_cells: report.dropped_cells })
+        Ok(SentScan { cells: self.sent_cells(view), dropped_cells: report.dropped_cells, encoding })
     }
 
     /// A frame did not come, or could not be used: says so at once, besides the regular heartbeats.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use fencepost_core::{
     geometry::Mount, ground::GroundSettings, map::MapSettings, matching::MatchSettings, obstacles::ObstacleSettings,
     settings::Settings, surfaces::SurfaceSettings, validate::ValidateSettings,
+    wire::{FrameFormat, WireSettings},
 };
 use serde::Deserialize;
 
@@ -20,21 +21,9 @@ pub struct Config {
     /// Takes the place of the recording's `mount.json`.
     pub mount: Option<Mount>,
     /// The bus.
-    pub wire: WireConfig,
+    pub wire: WireSettings,
     /// The file that it was read from.
     pub file: Option<PathBuf>,
-}
-
-/// Settings of the bus.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct WireConfig {
-    /// First of the 256 identifiers of the bus; `0x400` if left out.
-    pub base_id: Option<u16>,
-    /// Node id, for several pairs on one bus.
-    pub node: u8,
-    /// CAN FD frames instead of classic ones.
-    pub fd: bool,
 }
 
 /// The sections of a configuration file.
@@ -48,7 +37,7 @@ struct Sections {
     obstacles: ObstacleSettings,
     map: MapSettings,
     mount: Option<Mount>,
-    wire: WireConfig,
+    wire: WireSettings,
 }
 
 impl Config {
@@ -63,7 +52,11 @@ impl Config {
         };
         config.disparities = args.disparities.or(config.disparities);
         config.wire.node = args.node.unwrap_or(config.wire.node);
-        config.wire.fd |= args.can_fd;
+        if args.can_fd && config.wire.format == FrameFormat::Classic {
+            // Frames of CAN FD hold four times as many cells: as many cells as before fit in fewer frames.
+            let WireSettings { base_id, node, .. } = config.wire;
+            config.wire = WireSettings { base_id, node, ..WireSettings::FD };
+        }
         Ok(config)
     }
 
@@ -146,7 +139,7 @@ mod tests {
         let settings = config.settings_for(512);
         assert_eq!(settings.surfaces.horizontal_deg, 25.0);
         assert_eq!(settings.surfaces.min_pixels, SurfaceSettings::default().min_pixels);
-        assert_eq!(config.wire, WireConfig { base_id: None, node: 3, fd: false });
+        assert_eq!(config.wire, WireSettings { node: 3, ..WireSettings::CLASSIC });
     }
 
     #[test]

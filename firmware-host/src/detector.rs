@@ -1,11 +1,37 @@
-//! The program's detector.
+//! The program's detector: one for every camera up to 2048 x 1536, in memory that is there from the start.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use fencepost_core::{detector::Detector, rectify::grid_nodes};
+
+/// Most pixels of a picture.
+pub const PIXELS: usize = 2048 * 1536;
+/// Largest width of a picture, px.
+pub const WIDTH: usize = 2048;
+/// Most disparities searched.
+pub const DISPARITIES: usize = 256;
+/// Nodes of the rectification map of each camera.
+pub const GRID: usize = grid_nodes(2048, 1536);
+/// Most surfaces of a frame.
+pub const SURFACES: usize = 32768;
 /// Most obstacles of a frame.
-pub const OBSTACLES: usize = 128;
-/// Most cells of a map.
+pub const OBSTACLES: usize = 256;
+/// Most cells of a map: as many as the bus can name.
 pub const CELLS: usize = 16384;
+
+/// The program's detector.
+pub type ProgramDetector = Detector<PIXELS, WIDTH, DISPARITIES, GRID, SURFACES, OBSTACLES, CELLS>;
+
+/// All zero until it is configured: pages that smaller pictures do not touch never become memory.
+static DETECTOR: Mutex<ProgramDetector> = Mutex::new(ProgramDetector::new());
+
+/// The detector, for one run at a time.
+pub fn lock() -> MutexGuard<'static, ProgramDetector> {
+    // `configure` forgets everything, so what a run that panicked left behind does no harm.
+    DETECTOR.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Largest picture, for people.
 pub fn capacity_in_words() -> String {
-    "2048 x 1536 px".to_string()
+    format!("{WIDTH} px width and {PIXELS} pixels, such as {WIDTH} x {}", PIXELS / WIDTH)
 }

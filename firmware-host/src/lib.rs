@@ -1,6 +1,7 @@
 //! The program `fencepost`.
 #![deny(unsafe_code)]
 
+pub mod can_log;
 pub mod cli;
 pub mod config;
 pub mod console;
@@ -8,6 +9,11 @@ pub mod detector;
 pub mod error;
 pub mod output;
 pub mod paint;
+pub mod report;
+pub mod session;
+pub mod source;
+pub mod stopwatch;
+pub mod summary;
 pub mod view;
 pub mod words;
 

@@ -57,3 +57,8 @@ pub fn bytes(count: usize) -> String {
     let count = count as f64;
     if count >= KIB * KIB { format!("{:.1} MiB", count / (KIB * KIB)) } else { format!("{:.0} KiB", count / KIB) }
 }
+
+/// The reasons of `health`, each in words.
+pub fn reasons_in_words(health: Health) -> Vec<&'static str> {
+    HealthReason::ALL.into_iter().filter(|r| health.has(*r)).map(HealthReason::describe).collect()
+}

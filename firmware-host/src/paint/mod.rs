@@ -8,5 +8,5 @@ mod labels;
 
 pub use birdseye::birdseye;
 pub use canvas::{Canvas, grey8_png, grey16_png};
-pub use colours::{GROUND, HIDDEN, NO_VALUE, OBSTACLE, reason_colour, value_colour};
+pub use colours::{GROUND, NO_VALUE, OBSTACLE, hex, reason_colour, value_colour};
 pub use figures::{Figures, classes, disparity16};

@@ -1,0 +1,369 @@
+//! The page around the figures.
+
+use fencepost_core::{
+    geometry::{CameraModel, Mount, StereoCalibration},
+    health::{HealthLevel, HealthReason},
+};
+use minijinja::{Environment, context};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::{
+    ReportFrame,
+    charts::{Chart, Series},
+};
+use crate::{
+    console::WarningCount,
+    error::Failure,
+    paint,
+    session::{FrameRecord, Log},
+    summary::{self, StageTimes},
+    words,
+};
+
+const TEMPLATE: &str = include_str!("report.html");
+
+/// Everything that the page says besides the figures.
+#[derive(Debug)]
+pub struct PageInput<'a> {
+    /// What the recording is called.
+    pub name: &'a str,
+    /// Where it comes from.
+    pub description: &'a str,
+    /// What was found.
+    pub log: &'a Log,
+    /// What was odd.
+    pub warnings: &'a [WarningCount],
+    /// The settings, as in `summary.json`.
+    pub settings: &'a Value,
+    /// The pair of cameras.
+    pub calibration: &'a StereoCalibration,
+    /// How the left camera sits on the vehicle.
+    pub mount: &'a Mount,
+}
+
+#[derive(Serialize)]
+struct KeyFigure {
+    value: String,
+    unit: &'static str,
+    name: &'static str,
+}
+
+#[derive(Serialize)]
+struct ChartOnPage {
+    title: &'static str,
+    caption: String,
+    svg: String,
+}
+
+#[derive(Serialize)]
+struct StageRow {
+    name: &'static str,
+    words: &'static str,
+    median: String,
+    p99: String,
+    max: String,
+    bar_percent: f64,
+    tick_percent: f64,
+}
+
+#[derive(Serialize)]
+struct HealthRow {
+    level: &'static str,
+    words: &'static str,
+    frames: usize,
+    percent: f64,
+}
+
+#[derive(Serialize)]
+struct StripPart {
+    level: &'static str,
+    title: String,
+}
+
+#[derive(Serialize)]
+struct Setting {
+    name: String,
+    value: String,
+}
+
+pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<String, Failure> {
+    let mut environment = Environment::new();
+    // The name ends in `.html`, so everything that is put in is escaped.
+    let wrong = |error: minijinja::Error| Failure::work(format!("the report cannot be made: {error:#}")).at("report.html");
+    environment.add_template("report.html", TEMPLATE).map_err(wrong)?;
+    let records = &input.log.frames;
+    let page = context! {
+        name => input.name,
+        description => input.description,
+        version => env!("CARGO_PKG_VERSION"),
+        key_figures => key_figures(input.log),
+        failures => failures(input.log),
+        warnings => input.warnings,
+        frames => frames,
+        first_timestamp_ns => records.first().map_or(0, |f| f.timestamp_ns),
+        ground_colour => paint::hex(paint::GROUND),
+        obstacle_colour => paint::hex(paint::OBSTACLE),
+        no_value_colour => paint::hex(paint::NO_VALUE),
+        ground_charts => ground_charts(records, input.mount),
+        map_charts => map_charts(records),
+        stages => stage_rows(&summary::stage_times(records)),
+        time_chart => time_chart(records),
+        strip => strip(input.log),
+        levels => level_rows(input.log),
+        reasons => reason_rows(input.log),
+        settings => settings(input.settings),
+        calibration => calibration(input.calibration),
+        mount => summary::mount_words(input.mount),
+    };
+    environment.get_template("report.html").and_then(|template| template.render(page)).map_err(wrong)
+}
+
+fn key_figures(log: &Log) -> Vec<KeyFigure> {
+    let count = log.frames.len();
+    let mean = |value: &dyn Fn(&FrameRecord) -> f64| log.frames.iter().map(value).sum::<f64>() / count.max(1) as f64;
+    let density = |f: &FrameRecord| {
+        let without: u32 = f.statistics.pixels_without.iter().sum();
+        let with = f.statistics.pixels_with_disparity;
+        100.0 * f64::from(with) / f64::from((with + without).max(1))
+    };
+    let ok = log.frames.iter().filter(|f| f.health.level == HealthLevel::Ok).count();
+    let ground = log.frames.iter().filter(|f| f.ground.is_some_and(|g| g.age_frames == 0)).count();
+    let total = summary::stage_times(&log.frames).pop();
+    let of_all = |part: usize| format!("{part} of {}", count + log.failures.len());
+    vec![
+        KeyFigure { value: of_all(count), unit: "", name: "frames looked at" },
+        KeyFigure { value: of_all(ok), unit: "", name: "frames with nothing to say against them" },
+        KeyFigure { value: of_all(ground), unit: "", name: "frames with the ground in sight" },
+        KeyFigure { value: format!("{:.0}", mean(&density)), unit: "%", name: "of the pixels have a disparity" },
+        KeyFigure { value: format!("{:.1}", mean(&|f| f.obstacles as f64)), unit: "", name: "obstacles in a frame" },
+        KeyFigure {
+            value: total.map_or_else(String::new, |t| format!("{:.1}", t.times.median_ms)),
+            unit: "ms",
+            name: "from pictures to CAN frames (median)",
+        },
+    ]
+}
+
+fn failures(log: &Log) -> Vec<String> {
+    const LISTED: usize = 20;
+    let mut lines: Vec<_> = log.failures.iter().take(LISTED).map(|f| f.failure.to_string().replace("\n  ", " — ")).collect();
+    if log.failures.len() > LISTED {
+        lines.push(format!("and {} more", log.failures.len() - LISTED));
+    }
+    lines
+}
+
+/// Seconds from the first frame on; numbers of frames where the times do not rise.
+fn time_axis(records: &[FrameRecord]) -> (&'static str, Vec<f64>) {
+    let first_ns = records.first().map_or(0, |f| f.timestamp_ns);
+    let rising = records.windows(2).all(|w| w[1].timestamp_ns > w[0].timestamp_ns);
+    if rising && records.len() > 1 {
+        ("time, s", records.iter().map(|f| (f.timestamp_ns - first_ns) as f64 * 1.0e-9).collect())
+    } else {
+        ("frame", records.iter().map(|f| f64::from(f.number)).collect())
+    }
+}
+
+const SIZE: (u32, u32) = (560, 230);
+
+fn ground_charts(records: &[FrameRecord], mount: &Mount) -> Vec<ChartOnPage> {
+    type Value = fn(&fencepost_core::ground::GroundPlane) -> f32;
+    let (x_label, times) = time_axis(records);
+    let points = |value: Value, held: bool| -> Vec<(f64, f64)> {
+        let of = |f: &FrameRecord| f.ground.filter(|g| (g.age_frames > 0) == held).map_or(f64::NAN, |g| f64::from(value(&g)));
+        times.iter().copied().zip(records.iter().map(of)).collect()
+    };
+    let chart = |title, y_label, expected: Option<f32>, least_span, value: Value| {
+        let series = vec![
+            Series { colour: 0, dots: false, points: points(value, false) },
+            Series { colour: 2, dots: true, points: points(value, true) },
+        ];
+        let expected = expected.map(f64::from);
+        let caption = match expected {
+            Some(value) => format!("Dashed: what the mount says, {value:.2}."),
+            None => "The mount does not say it.".to_string(),
+        };
+        let chart = Chart { x_label, y_label, series, expected, least_span, from_zero: false };
+        ChartOnPage { title, caption, svg: chart.svg(SIZE) }
+    };
+    [
+        chart("Height of the camera", "height, m", mount.height_m, 0.2, |g| g.camera_height_m),
+        chart("Pitch", "pitch down, degrees", Some(mount.pitch_down_deg), 2.0, |g| g.pitch_down_rad.to_degrees()),
+        chart("Roll", "roll, degrees", Some(mount.roll_deg), 2.0, |g| g.roll_rad.to_degrees()),
+    ]
+    .into_iter()
+    .filter(|chart| !chart.svg.is_empty())
+    .collect()
+}
+
+fn map_charts(records: &[FrameRecord]) -> Vec<ChartOnPage> {
+    let (x_label, times) = time_axis(records);
+    let points = |value: &dyn Fn(&FrameRecord) -> f64| -> Vec<(f64, f64)> {
+        times.iter().copied().zip(records.iter().map(value)).collect()
+    };
+    let nearest = Chart {
+        x_label,
+        y_label: "distance, m",
+        series: vec![Series { colour: 0, dots: false, points: points(&|f| f.nearest_m.map_or(f64::NAN, f64::from)) }],
+        expected: None,
+        least_span: 1.0,
+        from_zero: true,
+    };
+    let cells = Chart {
+        x_label,
+        y_label: "cells",
+        series: vec![
+            Series { colour: 0, dots: false, points: points(&|f| f64::from(f.statistics.cells_free)) },
+            Series { colour: 1, dots: false, points: points(&|f| f64::from(f.statistics.cells_obstacle)) },
+        ],
+        expected: None,
+        least_span: 1.0,
+        from_zero: true,
+    };
+    [
+        ("Nearest obstacle", "From the vehicle’s origin. A gap: no obstacle.", nearest),
+        ("Cells on the map", "Green: free. Red: obstacle.", cells),
+    ]
+    .into_iter()
+    .map(|(title, caption, chart)| ChartOnPage { title, caption: caption.to_string(), svg: chart.svg(SIZE) })
+    .filter(|chart| !chart.svg.is_empty())
+    .collect()
+}
+
+fn time_chart(records: &[FrameRecord]) -> String {
+    let (x_label, times) = time_axis(records);
+    let points = times.into_iter().zip(records.iter().map(|f| f.times.total_ms)).collect();
+    let series = vec![Series { colour: 0, dots: false, points }];
+    let y_label = "milliseconds";
+    Chart { x_label, y_label, series, expected: None, least_span: 1.0, from_zero: true }.svg((1140, 220))
+}
+
+fn stage_rows(stages: &[StageTimes]) -> Vec<StageRow> {
+    // The bars of the stages share a scale; the sum would dwarf them and goes without a bar.
+    let parts = || stages.iter().filter(|s| s.name != "total");
+    let largest = parts().map(|s| s.times.max_ms).fold(1.0e-9, f64::max);
+    let text = |ms: f64| if ms < 0.1 { format!("{ms:.3}") } else { format!("{ms:.2}") };
+    stages
+        .iter()
+        .map(|stage| StageRow {
+            name: stage.name,
+            words: stage.words,
+            median: text(stage.times.median_ms),
+            p99: text(stage.times.p99_ms),
+            max: text(stage.times.max_ms),
+            bar_percent: if stage.name == "total" { 0.0 } else { 100.0 * stage.times.median_ms / largest },
+            tick_percent: if stage.name == "total" { 0.0 } else { 100.0 * stage.times.max_ms / largest },
+        })
+        .collect()
+}
+
+/// A part for each frame, or for as many frames as give 300 parts, coloured by the worst of them.
+fn strip(log: &Log) -> Vec<StripPart> {
+    const PARTS: usize = 300;
+    let mut frames: Vec<(Option<u32>, HealthLevel, String)> = log
+        .frames
+        .iter()
+        .map(|f| (Some(f.number), f.health.level, words::reason_names(f.health, ", ")))
+        .chain(log.failures.iter().map(|f| (f.number, HealthLevel::Blind, "missing_picture".to_string())))
+        .collect();
+    frames.sort_by_key(|(number, ..)| *number);
+    let size = frames.len().div_ceil(PARTS).max(1);
+    let worst = |part: &[(Option<u32>, HealthLevel, String)]| {
+        let (number, level, reasons) = part.iter().max_by_key(|(_, level, _)| *level)?;
+        let number = number.map_or_else(|| "?".to_string(), |n| n.to_string());
+        let level = words::level_name(*level);
+        Some(StripPart { level, title: format!("frame {number}: {level} {reasons}") })
+    };
+    frames.chunks(size).filter_map(worst).collect()
+}
+
+fn level_rows(log: &Log) -> Vec<HealthRow> {
+    let (levels, _) = summary::health_counts(log);
+    let all = (log.frames.len() + log.failures.len()).max(1) as f64;
+    let words = |level| match level {
+        HealthLevel::Ok => "nothing to say against the cells",
+        HealthLevel::Degraded => "usable with care",
+        HealthLevel::Blind => "the cells carry nothing",
+        HealthLevel::Fault => "the detector does not work",
+    };
+    let row = |level: HealthLevel| {
+        let name = words::level_name(level);
+        let frames = levels.get(name).copied().unwrap_or_default();
+        HealthRow { level: name, words: words(level), frames, percent: 100.0 * frames as f64 / all }
+    };
+    words::LEVELS.map(row).into()
+}
+
+fn reason_rows(log: &Log) -> Vec<HealthRow> {
+    let (_, reasons) = summary::health_counts(log);
+    let all = (log.frames.len() + log.failures.len()).max(1) as f64;
+    let mut rows: Vec<_> = HealthReason::ALL
+        .into_iter()
+        .map(|reason| {
+            let frames = reasons.get(reason.name()).copied().unwrap_or_default();
+            HealthRow { level: reason.name(), words: reason.describe(), frames, percent: 100.0 * frames as f64 / all }
+        })
+        .filter(|row| row.frames > 0)
+        .collect();
+    rows.sort_by_key(|row| std::cmp::Reverse(row.frames));
+    rows
+}
+
+/// Every setting with its full name, as it is written in a configuration file.
+fn settings(settings: &Value) -> Vec<Setting> {
+    fn walk(prefix: &str, value: &Value, out: &mut Vec<Setting>) {
+        match value {
+            Value::Object(map) => {
+                for (key, value) in map {
+                    let name = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+                    walk(&name, value, out);
+                }
+            }
+            Value::Number(number) if number.is_f64() => {
+                // Settings are 32-bit: written with 64 bits, 0.1 would be 0.10000000149.
+                let value = number.as_f64().unwrap_or_default() as f32;
+                out.push(Setting { name: prefix.to_string(), value: value.to_string() });
+            }
+            Value::String(text) => out.push(Setting { name: prefix.to_string(), value: text.clone() }),
+            Value::Null => out.push(Setting { name: prefix.to_string(), value: "off".to_string() }),
+            other => out.push(Setting { name: prefix.to_string(), value: other.to_string() }),
+        }
+    }
+    let mut out = Vec::new();
+    walk("", settings, &mut out);
+    out
+}
+
+fn calibration(calibration: &StereoCalibration) -> Vec<Setting> {
+    let setting = |name: &str, value: String| Setting { name: name.to_string(), value };
+    match calibration {
+        StereoCalibration::Rectified(pair) => vec![
+            setting("pictures", format!("{} × {} px, arrive rectified", pair.width, pair.height)),
+            setting("focal length", format!("{:.2} px", pair.focal_px)),
+            setting("principal point", format!("({:.2}, {:.2}) px", pair.cx, pair.cy)),
+            setting("baseline", format!("{:.4} m", pair.baseline_m)),
+            setting("disparity offset", format!("{:.2} px", pair.disparity_offset_px)),
+        ],
+        StereoCalibration::Raw(raw) => {
+            let camera = |camera: &CameraModel| {
+                let CameraModel { fx, fy, cx, cy, .. } = *camera;
+                format!("focal length ({fx:.2}, {fy:.2}) px, principal point ({cx:.2}, {cy:.2}) px")
+            };
+            let lens = |camera: &CameraModel| {
+                let used = camera.distortion.0.iter().rposition(|k| *k != 0.0).map_or(0, |last| last + 1);
+                let listed: Vec<_> = camera.distortion.0.iter().take(used).map(|k| format!("{k:.5}")).collect();
+                if listed.is_empty() { "no distortion".to_string() } else { listed.join(", ") }
+            };
+            let [x, y, z] = raw.translation_m;
+            vec![
+                setting("pictures", format!("{} × {} px, raw", raw.left.width, raw.left.height)),
+                setting("left camera", camera(&raw.left)),
+                setting("left lens", lens(&raw.left)),
+                setting("right camera", camera(&raw.right)),
+                setting("right lens", lens(&raw.right)),
+                setting("baseline", format!("{:.4} m", (x * x + y * y + z * z).sqrt())),
+            ]
+        }
+    }
+}
