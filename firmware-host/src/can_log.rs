@@ -131,6 +131,10 @@ impl CanLog {
         for frame in self.frames.iter() {
             write_frame(self.file.as_mut(), frame, now_ns)?;
         }
+        if self.counts.scans == 0 {
+            // A receiver takes no scan from a node that is not running: it hears at once that this one is.
+            self.heartbeat(now_ns)?;
+        }
         self.flush()?;
         let frames = self.frames.len() as u64;
         self.counts.scans += 1;

@@ -143,6 +143,16 @@ pub struct DecodeArgs {
     /// Only messages of this node.
     #[arg(long, value_name = "N")]
     pub node: Option<u8>,
+    /// First identifier of the nodes, decimal or as 0x500.
+    #[arg(long, value_name = "ID", default_value = "0x400", value_parser = identifier)]
+    pub base_id: u16,
+}
+
+fn identifier(text: &str) -> Result<u16, ParseIntError> {
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => u16::from_str_radix(digits, 16),
+        None => text.parse(),
+    }
 }
 
 /// One kind of output of `replay`.

@@ -1,8 +1,23 @@
-//! The program `fencepost`.
+//! The program `fencepost`: stereo pictures in, obstacle cells on CAN out, and everything to look at what happens between.
+//!
+//! ```text
+//! cli ──> commands ──> session ──> detector (fencepost-core)
+//!           demo         │  frame by frame, as a view
+//!           replay       ├──> can_log    can.log
+//!           check        ├──> output     cells.csv, obstacles.csv, ground.csv
+//!           can decode   ├──> paint      disparity/, classes/, map/
+//!                        ├──> summary    summary.json
+//!                        └──> report     report.html
+//! ```
+//!
+//! Everything that can go wrong is a [`error::Failure`]: what is wrong, where, and the mend. The exit status is 0 if
+//! everything worked, 1 if the work failed or the input is bad, 2 if the program was called wrongly or its configuration
+//! cannot be used.
 #![deny(unsafe_code)]
 
 pub mod can_log;
 pub mod cli;
+pub mod commands;
 pub mod config;
 pub mod console;
 pub mod detector;
@@ -19,7 +34,35 @@ pub mod words;
 
 use std::{ffi::OsString, process::ExitCode};
 
-/// Runs the program.
-pub fn run(_arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    ExitCode::SUCCESS
+use clap::Parser;
+
+use cli::{CanCommand, Cli, Command, DemoArgs};
+use console::Console;
+use error::FailureKind;
+
+/// Runs the program with the arguments of its command line, the first of which is its own name.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are no errors and go to stdout.
+            let status = if error.use_stderr() { FailureKind::Usage.exit_status() } else { 0 };
+            let _ = error.print();
+            return ExitCode::from(status);
+        }
+    };
+    let mut console = Console::new(cli.quiet, cli.verbose);
+    let result = match cli.command.unwrap_or_else(|| Command::Demo(DemoArgs::default())) {
+        Command::Demo(args) => commands::demo(&args, &mut console),
+        Command::Replay(args) => commands::replay(&args, &mut console),
+        Command::Check(args) => commands::check(&args, &mut console),
+        Command::Can(CanCommand::Decode(args)) => commands::decode(&args, &console),
+    };
+    match result {
+        Ok(ending) => ExitCode::from(ending.exit_status()),
+        Err(failure) => {
+            console.error(&failure);
+            ExitCode::from(failure.kind)
+        }
+    }
 }

@@ -4,7 +4,7 @@ use fencepost_core::{
     geometry::{CameraModel, Mount, StereoCalibration},
     health::{HealthLevel, HealthReason},
 };
-use minijinja::{Environment, context};
+use minijinja::Environment;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -40,6 +40,31 @@ pub struct PageInput<'a> {
     pub calibration: &'a StereoCalibration,
     /// How the left camera sits on the vehicle.
     pub mount: &'a Mount,
+}
+
+/// What the template is given.
+#[derive(Serialize)]
+struct Page<'a> {
+    name: &'a str,
+    description: &'a str,
+    version: &'static str,
+    key_figures: Vec<KeyFigure>,
+    failures: Vec<String>,
+    warnings: &'a [WarningCount],
+    frames: &'a [ReportFrame],
+    first_timestamp_ns: u64,
+    ground_colour: String,
+    obstacle_colour: String,
+    ground_charts: Vec<ChartOnPage>,
+    map_charts: Vec<ChartOnPage>,
+    stages: Vec<StageRow>,
+    time_chart: String,
+    strip: Vec<StripPart>,
+    levels: Vec<HealthRow>,
+    reasons: Vec<HealthRow>,
+    settings: Vec<Setting>,
+    calibration: Vec<Setting>,
+    mount: String,
 }
 
 #[derive(Serialize)]
@@ -93,30 +118,29 @@ pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<St
     let wrong = |error: minijinja::Error| Failure::work(format!("the report cannot be made: {error:#}")).at("report.html");
     environment.add_template("report.html", TEMPLATE).map_err(wrong)?;
     let records = &input.log.frames;
-    let page = context! {
-        name => input.name,
-        description => input.description,
-        version => env!("CARGO_PKG_VERSION"),
-        key_figures => key_figures(input.log),
-        failures => failures(input.log),
-        warnings => input.warnings,
-        frames => frames,
-        first_timestamp_ns => records.first().map_or(0, |f| f.timestamp_ns),
-        ground_colour => paint::hex(paint::GROUND),
-        obstacle_colour => paint::hex(paint::OBSTACLE),
-        no_value_colour => paint::hex(paint::NO_VALUE),
-        ground_charts => ground_charts(records, input.mount),
-        map_charts => map_charts(records),
-        stages => stage_rows(&summary::stage_times(records)),
-        time_chart => time_chart(records),
-        strip => strip(input.log),
-        levels => level_rows(input.log),
-        reasons => reason_rows(input.log),
-        settings => settings(input.settings),
-        calibration => calibration(input.calibration),
-        mount => summary::mount_words(input.mount),
+    let page = Page {
+        name: input.name,
+        description: input.description,
+        version: env!("CARGO_PKG_VERSION"),
+        key_figures: key_figures(input.log),
+        failures: failures(input.log),
+        warnings: input.warnings,
+        frames,
+        first_timestamp_ns: records.first().map_or(0, |f| f.timestamp_ns),
+        ground_colour: paint::hex(paint::GROUND),
+        obstacle_colour: paint::hex(paint::OBSTACLE),
+        ground_charts: ground_charts(records, input.mount),
+        map_charts: map_charts(records),
+        stages: stage_rows(&summary::stage_times(records)),
+        time_chart: time_chart(records),
+        strip: strip(input.log),
+        levels: level_rows(input.log),
+        reasons: reason_rows(input.log),
+        settings: settings(input.settings),
+        calibration: calibration(input.calibration),
+        mount: summary::mount_words(input.mount),
     };
-    environment.get_template("report.html").and_then(|template| template.render(page)).map_err(wrong)
+    environment.get_template("report.html").and_then(|template| template.render(minijinja::Value::from(minijinja::value::Serde(page)))).map_err(wrong)
 }
 
 fn key_figures(log: &Log) -> Vec<KeyFigure> {

@@ -1,0 +1,99 @@
+//! What the program does, a module for each command.
+
+mod can;
+mod check;
+mod demo;
+mod optics;
+mod replay;
+
+pub use can::decode;
+pub use check::check;
+pub use demo::demo;
+pub use replay::replay;
+
+use std::{path::Path, time::Instant};
+
+use crate::{
+    cli::Output,
+    config::Config,
+    console::Console,
+    error::{Failure, FailureKind},
+    output::OutputFolder,
+    report::PageInput,
+    session::{self, Job},
+    source::{Input, Source},
+    summary,
+};
+
+/// How a command ended, where it went to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Everything worked.
+    Good,
+    /// The work was done, but some of the input could not be used.
+    InputBad,
+}
+
+impl Ending {
+    /// Exit status of the program.
+    pub const fn exit_status(self) -> u8 {
+        match self {
+            Self::Good => 0,
+            Self::InputBad => FailureKind::Work.exit_status(),
+        }
+    }
+}
+
+/// Detects in every frame of `input` and writes everything that is wanted to `out`.
+fn detect_and_write<S: Source>(
+    input: &mut Input<S>,
+    config: &Config,
+    (out, write): (&Path, &[Output]),
+    console: &mut Console,
+    progress: &'static str,
+) -> Result<Ending, Failure> {
+    let start = Instant::now();
+    let folder = OutputFolder::open(out)?;
+    for warning in std::mem::take(&mut input.warnings) {
+        console.warn(warning);
+    }
+    if let Some(mount) = config.mount {
+        input.mount = mount;
+    }
+    let settings = config.settings_for(input.picture_size().0);
+    let job = Job { folder: &folder, write, settings, wire: config.wire, config };
+    console.note(format_args!("{}: {} frames, {}", input.name, input.frames, input.description));
+    let (log, report) = session::run(input, &job, console, progress)?;
+
+    let summary = summary::summary(input, &job, &log, console.warnings());
+    let mut text = serde_json::to_string_pretty(&summary)
+        .map_err(|error| Failure::work(format!("the summary cannot be made: {error}")))?;
+    text.push('\n');
+    folder.write("summary.json", text.as_bytes())?;
+    if write.contains(&Output::Report) {
+        let page = report.page(&PageInput {
+            name: &input.name,
+            description: &input.description,
+            log: &log,
+            warnings: console.warnings(),
+            settings: &summary["settings"],
+            calibration: &input.calibration,
+            mount: &input.mount,
+        })?;
+        folder.write("report.html", page.as_bytes())?;
+    }
+    console.result(summary::table(&log));
+    console.result(format_args!("\nwritten to  {} in {}", out.display(), session::seconds(start.elapsed())));
+    if write.contains(&Output::Report) {
+        console.result(format_args!("report      {}", out.join("report.html").display()));
+    }
+    if !log.failures.is_empty() {
+        console.error(format_args!(
+            "{} of {} frames could not be used; what was written of the others is complete",
+            log.failures.len(),
+            log.failures.len() + log.frames.len()
+        ));
+        return Ok(Ending::InputBad);
+    }
+    Ok(Ending::Good)
+}
