@@ -60,7 +60,7 @@ pub struct DemoArgs {
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out: PathBuf,
     /// Number of frames to render.
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
     /// Settings of the detector and of the bus.
     #[command(flatten)]
@@ -69,7 +69,7 @@ pub struct DemoArgs {
 
 impl Default for DemoArgs {
     fn default() -> Self {
-        Self { out: "out/demo".into(), frames: 12, detector: DetectorArgs::default() }
+        Self { out: "out/demo".into(), frames: 8, detector: DetectorArgs::default() }
     }
 }
 

@@ -3,8 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use fencepost_core::{
-    geometry::Mount, ground::GroundSettings, map::MapSettings, matching::MatchSettings, obstacles::ObstacleSettings,
-    settings::Settings, surfaces::SurfaceSettings, validate::ValidateSettings,
+    geometry::Mount,
+    ground::GroundSettings,
+    map::MapSettings,
+    matching::MatchSettings,
+    obstacles::ObstacleSettings,
+    settings::Settings,
+    surfaces::SurfaceSettings,
+    validate::ValidateSettings,
     wire::{FrameFormat, WireSettings},
 };
 use serde::Deserialize;
@@ -79,8 +85,7 @@ impl Config {
                 .mend("compare it with the list of settings in docs/files.md")
         };
         let table: toml::Table = text.parse().map_err(wrong)?;
-        let chose_disparities =
-            table.get("matching").and_then(|section| section.get("disparities")).is_some();
+        let chose_disparities = table.get("matching").and_then(|section| section.get("disparities")).is_some();
         let Sections { matching, validate, surfaces, ground, obstacles, map, mount, wire } =
             toml::from_str(&text).map_err(wrong)?;
         Ok(Self {

@@ -90,7 +90,9 @@ impl Failure {
                 format!("give pictures of at most {}", crate::detector::capacity_in_words())
             }
             ConfigProblem::OverCapacity { capacity, .. } => format!("set {field} to {capacity} or less"),
-            ConfigProblem::OutOfRange { min, max } if !from_input => format!("set {field} to {min} or more, {max} at most"),
+            ConfigProblem::OutOfRange { min, max } if !from_input => {
+                format!("set {field} to {min} or more, {max} at most")
+            }
             _ if from_input => "calibrate again, or correct the value by hand".to_string(),
             _ => format!("correct {field} in the configuration"),
         })

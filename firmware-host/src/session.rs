@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use fencepost_core::{
     detector::{DetectError, Statistics},
     health::{Health, HealthLevel, HealthReason},
+    map::{CellState, MapGeometry},
     picture::Picture,
     rectify::Side,
     settings::Settings,
@@ -19,7 +20,7 @@ use crate::{
     console::Console,
     detector::{self, ProgramDetector},
     error::Failure,
-    output::{OutputFolder, Tables},
+    output::{CellRow, OutputFolder, Tables},
     paint,
     report::{Report, ReportFrame},
     source::{Input, Source},
@@ -70,7 +71,7 @@ pub struct FrameRecord {
     pub statistics: Statistics,
     /// Obstacles.
     pub obstacles: usize,
-    /// Distance to the nearest obstacle, metres.
+    /// Distance from the vehicle's origin to the centre of the nearest obstacle cell, metres.
     pub nearest_m: Option<f32>,
 }
 
@@ -164,12 +165,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn missing(
-        &mut self,
-        upcoming: Option<(u32, u64)>,
-        failure: Failure,
-        console: &Console,
-    ) -> Result<(), Failure> {
+    fn missing(&mut self, upcoming: Option<(u32, u64)>, failure: Failure, console: &Console) -> Result<(), Failure> {
         console.error(&failure);
         let (number, timestamp_ns) = upcoming.unzip();
         self.can.missing(timestamp_ns)?;
@@ -222,7 +218,7 @@ impl<'a> Session<'a> {
             ground: detection.ground,
             statistics: detection.statistics,
             obstacles: detection.obstacles.len(),
-            nearest_m: detection.obstacles.iter().map(|o| o.distance_m()).reduce(f32::min),
+            nearest_m: nearest_cell_m(&sent.cells, &detection.map.geometry),
         };
         self.log.frames.push(record);
         self.report.frame(|| ReportFrame::paint(&view, &self.job.settings));
@@ -267,6 +263,12 @@ impl From<Failure> for FrameError {
     fn from(failure: Failure) -> Self {
         Self::Output(failure)
     }
+}
+
+fn nearest_cell_m(cells: &[CellRow], geometry: &MapGeometry) -> Option<f32> {
+    let obstacles = cells.iter().filter(|row| row.content.state == CellState::Obstacle);
+    let distances = obstacles.map(|row| geometry.centre_m(row.cell.0, row.cell.1)).map(|(x, y)| x.hypot(y));
+    distances.reduce(f32::min)
 }
 
 fn rectify_left(detector: &ProgramDetector, raw: &Picture<'_>, out: &mut [u8]) {

@@ -221,7 +221,10 @@ pub fn table(log: &Log) -> String {
     let figure = |name: &str| ground.get(name).and_then(Value::as_f64);
     lines.push(String::new());
     lines.push(format!("frames      {} detected, {} failed", log.frames.len(), log.failures.len()));
-    lines.push(format!("health      {}", if levels.is_empty() { "nothing seen".to_string() } else { levels.join(", ") }));
+    lines.push(format!(
+        "health      {}",
+        if levels.is_empty() { "nothing seen".to_string() } else { levels.join(", ") }
+    ));
     lines.push(format!("disparity   {:.0} % of the pixels", 100.0 * mean(&pixels)));
     lines.push(match (figure("camera_height_m"), figure("pitch_down_deg")) {
         (Some(height), Some(pitch)) => {

@@ -49,8 +49,9 @@ pub fn decode(args: &DecodeArgs, console: &Console) -> Result<Ending, Failure> {
             .at(args.log.display().to_string())
             .mend("give a log in candump’s format, such as the can.log of a replay")
     })?;
-    let base = BaseId::new(args.base_id)
-        .map_err(|error| Failure::usage(error.to_string()).at("--base-id").mend("give the base of the sender’s settings"))?;
+    let base = BaseId::new(args.base_id).map_err(|error| {
+        Failure::usage(error.to_string()).at("--base-id").mend("give the base of the sender’s settings")
+    })?;
     let mut decoder = Decoder::new(args, base, BufWriter::new(io::stdout().lock()));
     match decoder.run(&log) {
         Ok(()) => {}
@@ -203,7 +204,15 @@ impl<'a, W: Write> Decoder<'a, W> {
         }
         match line {
             Some(line) => {
-                writeln!(self.out, "{:>16} {} {:<7} {:<13} {what}: {}", time(line), line.interface, "", "ERROR", line.frame)
+                writeln!(
+                    self.out,
+                    "{:>16} {} {:<7} {:<13} {what}: {}",
+                    time(line),
+                    line.interface,
+                    "",
+                    "ERROR",
+                    line.frame
+                )
             }
             None => writeln!(self.out, "{:>16} {:<13} {what}", "", "ERROR"),
         }

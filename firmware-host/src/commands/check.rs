@@ -65,10 +65,14 @@ fn check_recording(folder: &Path, config: &Config, console: &mut Console) -> Res
     let calibration = recording.calibration.clone();
     let mount = config.mount.unwrap_or(recording.mount);
     let broken = read_all(recording.into_camera(), console);
-    line(&mut text, "pictures", match broken {
-        0 => "all can be read".to_string(),
-        count => format!("{count} frames cannot be used"),
-    });
+    line(
+        &mut text,
+        "pictures",
+        match broken {
+            0 => "all can be read".to_string(),
+            count => format!("{count} frames cannot be used"),
+        },
+    );
     describe_calibration(&mut text, &calibration);
     let ending = if broken == 0 { Ending::Good } else { Ending::InputBad };
     describe_view(&mut text, &calibration.stereo, &mount, config)?;
@@ -108,14 +112,22 @@ fn check_configuration(args: &CheckArgs, console: &mut Console) -> Result<Ending
     detector::lock().configure(&settings, &StereoCalibration::Rectified(pair), &mount).map_err(wrong)?;
     let mut text = String::new();
     line(&mut text, "configuration", args.path.display());
-    line(&mut text, "disparities", match config.has_disparities() {
-        true => settings.matching.disparities.to_string(),
-        false => "an eighth of the picture’s width, in steps of 16, within 16 to 128".to_string(),
-    });
-    line(&mut text, "mount", match config.mount {
-        Some(mount) => summary::mount_words(&mount),
-        None => "as the recording says".to_string(),
-    });
+    line(
+        &mut text,
+        "disparities",
+        match config.has_disparities() {
+            true => settings.matching.disparities.to_string(),
+            false => "an eighth of the picture’s width, in steps of 16, within 16 to 128".to_string(),
+        },
+    );
+    line(
+        &mut text,
+        "mount",
+        match config.mount {
+            Some(mount) => summary::mount_words(&mount),
+            None => "as the recording says".to_string(),
+        },
+    );
     describe_bus(&mut text, &config)?;
     line(&mut text, "memory", format_args!("{} in this program", words::bytes(size_of::<ProgramDetector>())));
     let all = toml::to_string(&settings).map_err(|error| Failure::work(error.to_string()))?;
@@ -213,7 +225,15 @@ fn describe_view(
     line(text, "mount", summary::mount_words(mount));
     describe_blind_zone(text, &pair, mount, &settings);
     describe_bus(text, config)?;
-    line(text, "memory", format_args!("{} in this program, built for {}", words::bytes(size_of::<ProgramDetector>()), detector::capacity_in_words()));
+    line(
+        text,
+        "memory",
+        format_args!(
+            "{} in this program, built for {}",
+            words::bytes(size_of::<ProgramDetector>()),
+            detector::capacity_in_words()
+        ),
+    );
     describe_resolution(text, &pair, &settings);
     Ok(())
 }
@@ -223,10 +243,13 @@ fn describe_blind_zone(text: &mut String, pair: &RectifiedPair, mount: &Mount, s
     line(
         text,
         "blind zone",
-        format_args!("nearer than {nearest_m:.2} m along the optical axis ({} disparities)", settings.matching.disparities),
+        format_args!(
+            "nearer than {nearest_m:.2} m along the optical axis ({} disparities)",
+            settings.matching.disparities
+        ),
     );
     let assumed = if mount.height_m.is_some() { "" } else { ", if the assumed height is right" };
-    let words = match (optics::ground_begins_m(pair, mount), optics::ground_in_range_m(pair, mount, nearest_m)) {
+    let words = match (optics::ground_begins_m(pair, mount), optics::ground_in_range_m(mount, nearest_m)) {
         (None, _) => "never: the cameras look over it; pitch them down".to_string(),
         (Some(view), Some(range)) if range > view => {
             format!("{range:.2} m ahead (in the picture from {view:.2} m, but too near for the disparities){assumed}")
@@ -264,7 +287,11 @@ fn describe_resolution(text: &mut String, pair: &RectifiedPair, settings: &Setti
     let _ = writeln!(
         text,
         "\n{:>10} {:>12} {:>16} {:>16} {:>16}",
-        "distance", "disparity", "step of 1/16 px", "step of 1/2 px", format!("{cell_size_m} m cell")
+        "distance",
+        "disparity",
+        "step of 1/16 px",
+        "step of 1/2 px",
+        format!("{cell_size_m} m cell")
     );
     for row in optics::resolutions(pair, &settings.matching, cell_size_m) {
         let coarse = if row.half_pixel_m > cell_size_m { "  more than a cell" } else { "" };

@@ -56,7 +56,7 @@ pub(super) fn ground_begins_m(pair: &RectifiedPair, mount: &Mount) -> Option<f32
 }
 
 /// Where level ground straight ahead is far enough away for the disparity range, metres from the camera.
-pub(super) fn ground_in_range_m(pair: &RectifiedPair, mount: &Mount, nearest_m: f32) -> Option<f32> {
+pub(super) fn ground_in_range_m(mount: &Mount, nearest_m: f32) -> Option<f32> {
     let frame = VehicleFrame::new(mount).ok()?;
     let [_, _, ahead_z] = frame.rows()[0].map(f64::from);
     let [_, _, up_z] = frame.rows()[2].map(f64::from);
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn ground_in_range_lies_at_the_nearest_distance_along_the_axis() {
         let mount = Mount { height_m: Some(1.0), pitch_down_deg: 30.0, roll_deg: 0.0 };
-        let x = ground_in_range_m(&PAIR, &mount, 1.5).unwrap();
+        let x = ground_in_range_m(&mount, 1.5).unwrap();
         let (sin, cos) = 30.0_f32.to_radians().sin_cos();
         assert!((x * cos + 1.0 * sin - 1.5).abs() < 1.0e-4, "{x}");
     }

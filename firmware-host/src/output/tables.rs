@@ -212,11 +212,17 @@ mod tests {
 
         // Read while the tables are still open: what was written stays readable whatever comes.
         let cells = read(&folder, "cells.csv");
-        assert_eq!(cells[0], csv::StringRecord::from(&["7", "1500000000", "4.75", "-0.25", "obstacle", "321", "1.7"][..]));
+        assert_eq!(
+            cells[0],
+            csv::StringRecord::from(&["7", "1500000000", "4.75", "-0.25", "obstacle", "321", "1.7"][..])
+        );
         assert_eq!(cells[1], csv::StringRecord::from(&["7", "1500000000", "1.75", "2.25", "free", "12", "0.0"][..]));
         assert_eq!(read(&folder, "obstacles.csv").len(), made_up.detection.obstacles.len());
         let ground = read(&folder, "ground.csv");
-        assert_eq!(ground[0].iter().take(6).collect::<Vec<_>>(), ["7", "1500000000", "seen", "1.0200", "15.0000", "0.5000"]);
+        assert_eq!(
+            ground[0].iter().take(6).collect::<Vec<_>>(),
+            ["7", "1500000000", "seen", "1.0200", "15.0000", "0.5000"]
+        );
         assert_eq!(ground[0].iter().skip(13).collect::<Vec<_>>(), ["degraded", "low_coverage exposure_mismatch"]);
     }
 }

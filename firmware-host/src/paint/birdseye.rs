@@ -23,7 +23,7 @@ const GRID: Colour = [178, 182, 190];
 const VIEW: Colour = [36, 84, 170];
 
 /// Longest edge of the map itself, px.
-const LONGEST_PX: f32 = 760.0;
+const LONGEST_PX: f32 = 500.0;
 const LEFT_PX: i32 = 58;
 const TOP_PX: i32 = 34;
 const RIGHT_PX: i32 = 22;
@@ -173,7 +173,7 @@ fn paint_field_of_view(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>)
     }
 }
 
-/// A stroke through the middle of each obstacle along its largest extent.
+/// A stroke through the middle of each obstacle along its largest extent, as far as its box reaches.
 fn paint_obstacles(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
     let frame = scale.frame();
     for obstacle in &view.detection.obstacles {
@@ -181,8 +181,10 @@ fn paint_obstacles(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
         let half_m = obstacle.length_m.clamp(0.1, 50.0) / 2.0;
         let [x, y, _] = obstacle.mean_m;
         let ends = [-half_m, half_m].map(|along| scale.point(x + cos * along, y + sin * along));
+        let [near, far] = [obstacle.min_m, obstacle.max_m].map(|corner| scale.point(corner[0], corner[1]));
+        let extent = Rectangle::with_corners(near, far);
         for point in Line::new(ends[0], ends[1]).points() {
-            if frame.contains(point) {
+            if frame.contains(point) && extent.contains(point) {
                 canvas.blend(point.x, point.y, INK, 0.85);
             }
         }
@@ -191,7 +193,8 @@ fn paint_obstacles(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
 
 fn paint_robot(canvas: &mut Canvas, scale: &Scale) {
     let at = scale.point(0.0, 0.0);
-    let robot = Triangle::new(Point::new(at.x, at.y - 12), Point::new(at.x - 8, at.y + 5), Point::new(at.x + 8, at.y + 5));
+    let robot =
+        Triangle::new(Point::new(at.x, at.y - 12), Point::new(at.x - 8, at.y + 5), Point::new(at.x + 8, at.y + 5));
     draw(&robot.into_styled(PrimitiveStyle::with_fill(rgb(INK))), canvas);
 }
 
@@ -222,14 +225,27 @@ fn paint_words(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
 fn paint_legend(canvas: &mut Canvas, y: i32) {
     let plain = MonoTextStyle::new(&FONT_8X13, rgb(INK));
     let mut x = 12;
-    for (colour, hatched, word) in
-        [(OBSTACLE, false, "obstacle"), (FREE, false, "free"), (UNKNOWN, true, "not known"), (UNKNOWN, false, "out of view")]
-    {
+    for (colour, hatched, word) in [
+        (OBSTACLE, false, "obstacle"),
+        (FREE, false, "free"),
+        (UNKNOWN, true, "not known"),
+        (UNKNOWN, false, "out of view"),
+    ] {
         for dy in 0..13 {
             for dx in 0..13 {
                 let edge = dx == 0 || dy == 0 || dx == 12 || dy == 12;
                 let line = hatched && (x + dx + y + dy).rem_euclid(6) == 0;
-                canvas.set(x + dx, y + dy, if edge { INK } else if line { HATCH } else { colour });
+                canvas.set(
+                    x + dx,
+                    y + dy,
+                    if edge {
+                        INK
+                    } else if line {
+                        HATCH
+                    } else {
+                        colour
+                    },
+                );
             }
         }
         if word == "obstacle" {

@@ -1,6 +1,6 @@
 //! A colour picture in memory, and PNG files.
 
-use std::convert::Infallible;
+use std::{collections::BTreeMap, convert::Infallible};
 
 use embedded_graphics::{
     Pixel,
@@ -69,9 +69,33 @@ impl Canvas {
         Self::from_fn(self.width / step, self.height / step, |x, y| self.get(x * step + step / 2, y * step + step / 2))
     }
 
-    /// As the bytes of a PNG file.
+    /// As the bytes of a PNG file, quick to write: for the pictures of every frame.
     pub fn png(&self) -> Vec<u8> {
         encode(self.width, self.height, png::ColorType::Rgb, png::BitDepth::Eight, self.pixels.as_flattened())
+    }
+
+    /// As the bytes of a PNG file, small: with a palette if there are few enough colours. For the pictures of the report.
+    pub fn small_png(&self) -> Vec<u8> {
+        let mut places = BTreeMap::new();
+        let mut palette = Vec::new();
+        let mut indices = Vec::with_capacity(self.pixels.len());
+        for pixel in &self.pixels {
+            let place = *places.entry(*pixel).or_insert_with(|| {
+                palette.push(*pixel);
+                palette.len() - 1
+            });
+            let Ok(index) = u8::try_from(place) else { return self.png() };
+            indices.push(index);
+        }
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_palette(palette.into_flattened());
+        encoder.set_compression(png::Compression::Balanced);
+        // Neighbouring indices of a palette are not alike: filters would only spoil them.
+        encoder.set_filter(png::Filter::NoFilter);
+        finish(encoder, &indices);
+        bytes
     }
 }
 
@@ -110,11 +134,15 @@ fn encode(width: usize, height: usize, colour: png::ColorType, depth: png::BitDe
     encoder.set_color(colour);
     encoder.set_depth(depth);
     encoder.set_compression(png::Compression::Fast);
+    finish(encoder, data);
+    bytes
+}
+
+fn finish(encoder: png::Encoder<'_, &mut Vec<u8>>, data: &[u8]) {
     encoder
         .write_header()
         .and_then(|mut writer| writer.write_image_data(data))
         .expect("writing to memory fails only if the picture has no pixels or its data another size");
-    bytes
 }
 
 #[cfg(test)]
@@ -141,6 +169,22 @@ pub(crate) mod tests {
         let (_, _, data) = read_png(&grey16_png(37, 5, &wide));
         let back: Vec<u16> = data.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
         assert_eq!(back, wide);
+    }
+
+    #[test]
+    fn small_pictures_have_the_same_pixels() {
+        for colours in [1, 2, 200, 256, 257, 900] {
+            let canvas = Canvas::from_fn(31, 29, |x, y| {
+                let k = (y * 31 + x) % colours;
+                [(k % 256) as u8, (k / 256) as u8, 7]
+            });
+            let mut decoder = png::Decoder::new(std::io::Cursor::new(canvas.small_png()));
+            decoder.set_transformations(png::Transformations::EXPAND);
+            let mut reader = decoder.read_info().unwrap();
+            let mut data = vec![0; reader.output_buffer_size().unwrap()];
+            let info = reader.next_frame(&mut data).unwrap();
+            assert_eq!(&data[..info.buffer_size()], canvas.pixels.as_flattened(), "{colours} colours");
+        }
     }
 
     #[test]

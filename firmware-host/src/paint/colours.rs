@@ -3,7 +3,7 @@
 use fencepost_core::disparity::Reason;
 
 /// Red, green, blue.
-pub type Colour = [u8; 3];
+pub(crate) type Colour = [u8; 3];
 
 /// Pixels without a value: dark red, as in the paper's disparity pictures.
 pub const NO_VALUE: Colour = [84, 14, 20];
@@ -12,7 +12,7 @@ pub const GROUND: Colour = [226, 44, 42];
 /// Obstacles over the left picture; the paper, Figure 11 (g).
 pub const OBSTACLE: Colour = [36, 92, 240];
 /// Pixels of surfaces that a picture does not show.
-pub const HIDDEN: Colour = [30, 32, 36];
+pub(super) const HIDDEN: Colour = [30, 32, 36];
 
 /// Low to high: dark blue to yellow, rising in brightness, so that it also reads in grey and for colour-blind eyes.
 const RAMP: [Colour; 6] =
@@ -39,7 +39,7 @@ pub const fn reason_colour(reason: Reason) -> Colour {
 }
 
 /// A colour that tells object `number` from its neighbours: hues a golden angle apart.
-pub fn object_colour(number: u32, lightness: f32) -> Colour {
+pub(super) fn object_colour(number: u32, lightness: f32) -> Colour {
     let hue = (number as f32 * 0.618_034).fract();
     let channel = |shift: f32| {
         let distance = ((hue + shift).fract() * 6.0 - 3.0).abs() - 1.0;
@@ -50,7 +50,7 @@ pub fn object_colour(number: u32, lightness: f32) -> Colour {
 }
 
 /// `share` of `b` over `a`.
-pub fn mix(a: Colour, b: Colour, share: f32) -> Colour {
+pub(super) fn mix(a: Colour, b: Colour, share: f32) -> Colour {
     std::array::from_fn(|i| {
         let value = f32::from(a[i]) + (f32::from(b[i]) - f32::from(a[i])) * share;
         value.round().clamp(0.0, 255.0) as u8

@@ -12,6 +12,14 @@ use super::{
 };
 use crate::view::FrameView;
 
+/// Steps of grey under what is painted, so that the colours of a picture fit a palette of 256: 8 kinds of pixels of 32
+/// greys, 3 kinds of 64, and 16 greys beside the objects.
+const REASON_STEP: u8 = 8;
+const CLASS_STEP: u8 = 4;
+const HIDDEN_STEP: u8 = 16;
+/// Steps of the disparity's colours, for the same reason.
+const DISPARITY_STEPS: f32 = 250.0;
+
 /// Disparity in KITTI's convention: value / 256 px, 0 = none, row by row.
 pub fn disparity16(disparity: DisparityPicture<'_>) -> Vec<u16> {
     const SCALE: u32 = 256 / STEPS_PER_PIXEL as u32;
@@ -21,12 +29,16 @@ pub fn disparity16(disparity: DisparityPicture<'_>) -> Vec<u16> {
 
 /// Ground red, obstacle blue over the left picture; the paper, Figure 11 (g).
 pub fn classes(view: &FrameView<'_>) -> Canvas {
+    over_left(view, 1, |x, y, grey| class_colour(view, x, y, grey))
+}
+
+fn class_colour(view: &FrameView<'_>, x: usize, y: usize, grey: Colour) -> Colour {
     const SHARE: f32 = 0.55;
-    over_left(view, |x, y, grey| match surface_class(view, x, y) {
+    match (view.surface_at)(x, y).map(|surface| surface.class) {
         Some(SurfaceClass::Ground) => mix(grey, colours::GROUND, SHARE),
         Some(SurfaceClass::Obstacle) => mix(grey, colours::OBSTACLE, SHARE),
         _ => grey,
-    })
+    }
 }
 
 /// Paints the figures of one frame. The disparity's colours span the range searched.
@@ -43,7 +55,7 @@ pub struct Figures<'a> {
 impl Figures<'_> {
     /// (a) The left rectified picture.
     pub fn left(&self) -> Canvas {
-        over_left(self.view, |_, _, grey| grey)
+        over_left(self.view, 1, |_, _, grey| grey)
     }
 
     /// (b) Disparity, blue (far) to yellow (near); dark red has none.
@@ -54,7 +66,10 @@ impl Figures<'_> {
         self.paint(|x, y| {
             let pixel = self.view.disparity.row(y)[x];
             match pixel.has_value() {
-                true => value_colour(f32::from(pixel.steps()) * per_step - low_share),
+                true => {
+                    let value = f32::from(pixel.steps()) * per_step - low_share;
+                    value_colour((value * DISPARITY_STEPS).round() / DISPARITY_STEPS)
+                }
                 false => colours::NO_VALUE,
             }
         })
@@ -62,7 +77,7 @@ impl Figures<'_> {
 
     /// Why pixels have no disparity: a colour for each reason over the dimmed left picture.
     pub fn reasons(&self) -> Canvas {
-        over_left(self.view, |x, y, grey| match self.view.disparity.row(y)[x].get() {
+        over_left(self.view, REASON_STEP, |x, y, grey| match self.view.disparity.row(y)[x].get() {
             Ok(_) => mix(grey, [18, 20, 24], 0.45),
             Err(Reason::OutsideValidArea) => reason_colour(Reason::OutsideValidArea),
             Err(reason) => mix(grey, reason_colour(reason), 0.72),
@@ -91,7 +106,7 @@ impl Figures<'_> {
 
     /// (g) The final classification.
     pub fn classes(&self) -> Canvas {
-        classes(self.view)
+        over_left(self.view, CLASS_STEP, |x, y, grey| class_colour(self.view, x, y, grey))
     }
 
     fn surface_grey(&self, value: impl Fn(&fencepost_core::surfaces::Surface) -> f32) -> Canvas {
@@ -104,9 +119,9 @@ impl Figures<'_> {
     fn objects(&self, wanted: impl Fn(SurfaceClass) -> bool) -> Canvas {
         let labels = joined(self.view, self.step_sixteenths, wanted);
         let (width, _) = self.view.size();
-        over_left(self.view, |x, y, grey| match labels[y * width + x] {
-            NO_OBJECT => mix(grey, colours::HIDDEN, 0.82),
-            object => mix(object_colour(object, 1.0), grey, 0.25),
+        over_left(self.view, HIDDEN_STEP, |x, y, grey| match labels[y * width + x] {
+            NO_OBJECT => mix(grey, colours::HIDDEN, 0.8),
+            object => object_colour(object, 1.0),
         })
     }
 
@@ -116,15 +131,12 @@ impl Figures<'_> {
     }
 }
 
-fn surface_class(view: &FrameView<'_>, x: usize, y: usize) -> Option<SurfaceClass> {
-    (view.surface_at)(x, y).map(|surface| surface.class)
-}
-
-fn over_left(view: &FrameView<'_>, mut paint: impl FnMut(usize, usize, Colour) -> Colour) -> Canvas {
+/// Paints over the left picture, whose grey values are rounded down to multiples of `step`.
+fn over_left(view: &FrameView<'_>, step: u8, mut paint: impl FnMut(usize, usize, Colour) -> Colour) -> Canvas {
     let (width, height) = view.size();
     Canvas::from_fn(width, height, |x, y| {
         let grey = view.left.row(y).get(x).copied().unwrap_or_default();
-        paint(x, y, [grey; 3])
+        paint(x, y, [grey - grey % step; 3])
     })
 }
 
@@ -140,8 +152,7 @@ mod tests {
     fn disparity_files_hold_the_value_exactly() {
         MadeUp::new().view(|view| {
             let (width, height) = view.size();
-            let (read_width, read_height, bytes) =
-                read_png(&grey16_png(width, height, &disparity16(view.disparity)));
+            let (read_width, read_height, bytes) = read_png(&grey16_png(width, height, &disparity16(view.disparity)));
             assert_eq!((read_width, read_height), (width, height));
             for (value, pixel) in bytes.chunks_exact(2).zip(view.disparity.pixels()) {
                 let px = f64::from(u16::from_be_bytes([value[0], value[1]])) / 256.0;

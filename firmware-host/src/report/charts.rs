@@ -66,10 +66,10 @@ impl Chart {
         let mut chart = ChartBuilder::on(&root)
             .margin_top(10)
             .margin_right(14)
-            .x_label_area_size(40)
-            .y_label_area_size(58)
+            .x_label_area_size(44)
+            .y_label_area_size(62)
             .build_cartesian_2d(x.clone(), y)?;
-        let text = ("sans-serif", 13).into_font().color(&INK);
+        let text = ("sans-serif", 16).into_font().color(&INK);
         chart
             .configure_mesh()
             .disable_x_mesh()
@@ -78,7 +78,7 @@ impl Chart {
             .axis_style(INK)
             .x_desc(self.x_label)
             .y_desc(self.y_label)
-            .x_labels(8)
+            .x_labels(if size.0 < 450 { 6 } else { 10 })
             .y_labels(6)
             .label_style(text.clone())
             .axis_desc_style(text)
@@ -127,9 +127,9 @@ fn short(value: &f64) -> String {
 /// Replaces the stand-in colours by classes of the style sheet.
 fn with_classes(svg: &str) -> String {
     let names = [("1", "c0"), ("2", "c1"), ("3", "c2"), ("4", "ink"), ("5", "grid"), ("6", "expected")];
-    names.into_iter().fold(svg.to_string(), |svg, (number, name)| {
-        svg.replace(&format!("#0{number}0000"), &format!("var(--{name})"))
-    })
+    names
+        .into_iter()
+        .fold(svg.to_string(), |svg, (number, name)| svg.replace(&format!("#0{number}0000"), &format!("var(--{name})")))
 }
 
 #[cfg(test)]

@@ -73,8 +73,7 @@ impl ReportFrame {
 
     /// Paints the figures of a frame.
     pub fn paint(view: &FrameView<'_>, settings: &Settings) -> Self {
-        let figures =
-            Figures { view, scale_px: scale_px(view), step_sixteenths: settings.surfaces.step_sixteenths };
+        let figures = Figures { view, scale_px: scale_px(view), step_sixteenths: settings.surfaces.step_sixteenths };
         let statistics = &view.detection.statistics;
         let (width, height) = view.size();
         let percent = |pixels: u32| 100.0 * f64::from(pixels) / (width * height).max(1) as f64;
@@ -115,7 +114,12 @@ const MAP_CAPTION: &str = "The robot stands at (0, 0) and looks up. Red dots are
 
 fn camera_figures(figures: &Figures<'_>) -> Vec<Figure> {
     vec![
-        figure("a", "Left picture", "The left picture after rectification: rows of left and right are in line.", &figures.left()),
+        figure(
+            "a",
+            "Left picture",
+            "The left picture after rectification: rows of left and right are in line.",
+            &figures.left(),
+        ),
         figure(
             "b",
             "Disparity",
@@ -153,7 +157,7 @@ fn camera_figures(figures: &Figures<'_>) -> Vec<Figure> {
 
 fn figure(letter: &'static str, title: &'static str, caption: &'static str, canvas: &Canvas) -> Figure {
     let thinned = canvas.thinned(canvas.width().div_ceil(WIDEST));
-    let png = thinned.png();
+    let png = thinned.small_png();
     Figure {
         letter,
         title,

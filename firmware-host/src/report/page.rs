@@ -115,7 +115,8 @@ struct Setting {
 pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<String, Failure> {
     let mut environment = Environment::new();
     // The name ends in `.html`, so everything that is put in is escaped.
-    let wrong = |error: minijinja::Error| Failure::work(format!("the report cannot be made: {error:#}")).at("report.html");
+    let wrong =
+        |error: minijinja::Error| Failure::work(format!("the report cannot be made: {error:#}")).at("report.html");
     environment.add_template("report.html", TEMPLATE).map_err(wrong)?;
     let records = &input.log.frames;
     let page = Page {
@@ -140,7 +141,10 @@ pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<St
         calibration: calibration(input.calibration),
         mount: summary::mount_words(input.mount),
     };
-    environment.get_template("report.html").and_then(|template| template.render(minijinja::Value::from(minijinja::value::Serde(page)))).map_err(wrong)
+    environment
+        .get_template("report.html")
+        .and_then(|template| template.render(minijinja::Value::from(minijinja::value::Serde(page))))
+        .map_err(wrong)
 }
 
 fn key_figures(log: &Log) -> Vec<KeyFigure> {
@@ -171,7 +175,8 @@ fn key_figures(log: &Log) -> Vec<KeyFigure> {
 
 fn failures(log: &Log) -> Vec<String> {
     const LISTED: usize = 20;
-    let mut lines: Vec<_> = log.failures.iter().take(LISTED).map(|f| f.failure.to_string().replace("\n  ", " — ")).collect();
+    let mut lines: Vec<_> =
+        log.failures.iter().take(LISTED).map(|f| f.failure.to_string().replace("\n  ", " — ")).collect();
     if log.failures.len() > LISTED {
         lines.push(format!("and {} more", log.failures.len() - LISTED));
     }
@@ -190,12 +195,15 @@ fn time_axis(records: &[FrameRecord]) -> (&'static str, Vec<f64>) {
 }
 
 const SIZE: (u32, u32) = (560, 230);
+const THIRD: (u32, u32) = (370, 230);
 
 fn ground_charts(records: &[FrameRecord], mount: &Mount) -> Vec<ChartOnPage> {
     type Value = fn(&fencepost_core::ground::GroundPlane) -> f32;
     let (x_label, times) = time_axis(records);
     let points = |value: Value, held: bool| -> Vec<(f64, f64)> {
-        let of = |f: &FrameRecord| f.ground.filter(|g| (g.age_frames > 0) == held).map_or(f64::NAN, |g| f64::from(value(&g)));
+        let of = |f: &FrameRecord| {
+            f.ground.filter(|g| (g.age_frames > 0) == held).map_or(f64::NAN, |g| f64::from(value(&g)))
+        };
         times.iter().copied().zip(records.iter().map(of)).collect()
     };
     let chart = |title, y_label, expected: Option<f32>, least_span, value: Value| {
@@ -209,7 +217,7 @@ fn ground_charts(records: &[FrameRecord], mount: &Mount) -> Vec<ChartOnPage> {
             None => "The mount does not say it.".to_string(),
         };
         let chart = Chart { x_label, y_label, series, expected, least_span, from_zero: false };
-        ChartOnPage { title, caption, svg: chart.svg(SIZE) }
+        ChartOnPage { title, caption, svg: chart.svg(THIRD) }
     };
     [
         chart("Height of the camera", "height, m", mount.height_m, 0.2, |g| g.camera_height_m),
@@ -246,7 +254,11 @@ fn map_charts(records: &[FrameRecord]) -> Vec<ChartOnPage> {
         from_zero: true,
     };
     [
-        ("Nearest obstacle", "From the vehicle’s origin. A gap: no obstacle.", nearest),
+        (
+            "Nearest obstacle",
+            "To the middle of the nearest obstacle cell, from the vehicle’s origin. A gap: no obstacle.",
+            nearest,
+        ),
         ("Cells on the map", "Green: free. Red: obstacle.", cells),
     ]
     .into_iter()

@@ -1,10 +1,10 @@
 //! Single messages as text and as JSON.
 
+use fencepost_core::map::{SECTOR_CLEAR_DM, SECTOR_UNKNOWN};
 use fencepost_core::wire::{
     CellsRepr, EndRepr, GroundRepr, HeaderRepr, HeartbeatRepr, MeaninglessValue, Message, NodeState, Packet,
     ScanEchoRepr, SectorsRepr, VehicleMotionRepr, WireGround,
 };
-use fencepost_core::map::{SECTOR_CLEAR_DM, SECTOR_UNKNOWN};
 use serde_json::{Value, json};
 
 use crate::words;
@@ -113,7 +113,10 @@ fn sectors(sectors: &SectorsRepr) -> (String, Value) {
         SectorsRepr::Layout { scan_low, layout } => {
             let (left, width) = (f64::from(layout.left_cdeg) / 100.0, f64::from(layout.width_cdeg) / 100.0);
             let fields = json!({"scan_low": scan_low, "left_deg": left, "width_deg": width, "count": layout.count});
-            (format!("{} sectors of {width} degrees, the first begins {left} degrees to the left", layout.count), fields)
+            (
+                format!("{} sectors of {width} degrees, the first begins {left} degrees to the left", layout.count),
+                fields,
+            )
         }
     }
 }
@@ -139,7 +142,10 @@ fn ground(ground: &GroundRepr) -> (String, Value) {
                 "roll_deg": roll,
                 "age_frames": age_frames,
             });
-            (format!("camera {height_m:.3} m above it, pitched down {pitch:.2}, rolled {roll:.2} degrees{held}"), fields)
+            (
+                format!("camera {height_m:.3} m above it, pitched down {pitch:.2}, rolled {roll:.2} degrees{held}"),
+                fields,
+            )
         }
         None => ("no plane".to_string(), json!({"scan_low": ground.scan_low, "camera_height_m": null})),
     }
