@@ -62,6 +62,16 @@ impl<'a> Picture<'a> {
         self.height
     }
 
+    /// Bytes from the start of one row to the start of the next.
+    pub const fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// The bytes that hold the rows, [`Picture::stride`] apart.
+    pub const fn data(&self) -> &'a [u8] {
+        self.data
+    }
+
     /// Row `y` from the top, `width` pixels; the last row for any `y` below the picture.
     pub fn row(&self, y: usize) -> &'a [u8] {
         let start = y.min(self.height - 1) * self.stride;
