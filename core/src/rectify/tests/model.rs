@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::{made_up, recordings};
 use crate::{
     geometry::{CameraModel, RawPair, Rectification, RectifiedPair, StereoCalibration},
-    rectify::{Rectifier, Side, grid::PLACE_SHIFT, grid::STEP, grid_nodes},
+    rectify::{Rectifier, Side, grid::PLACE_SHIFT, grid::STEP, grid_nodes, sample::WEIGHT_SHIFT},
 };
 
 /// Enough for every picture here.
@@ -98,10 +98,10 @@ fn map_errors(name: &str, raw: &RawPair) {
                 let exact = rectifier.source_of(side, u as f32, v as f32).unwrap();
                 let exact = [f64::from(exact.0), f64::from(exact.1)];
                 let error = (0..2).map(|i| {
-                    // The place as the bilinear weights see it: rounded to 1/64 px.
+                    // The place as the bilinear weights see it, rounded.
                     let place = segment.start[i] + segment.slope[i] * (u % STEP) as i32;
-                    let seen = (place + (1 << (PLACE_SHIFT - 7))) >> (PLACE_SHIFT - 6);
-                    (f64::from(seen) / 64.0 - expected[i]).powi(2)
+                    let seen = (place + (1 << (PLACE_SHIFT - WEIGHT_SHIFT - 1))) >> (PLACE_SHIFT - WEIGHT_SHIFT);
+                    (f64::from(seen) / f64::from(1 << WEIGHT_SHIFT) - expected[i]).powi(2)
                 });
                 let error = error.sum::<f64>().sqrt();
                 worst = worst.max(error);
@@ -142,7 +142,7 @@ fn map_is_that_of_the_full_model_for_given_rectified_cameras() {
         let pair = RectifiedPair {
             width: 640,
             height: 360,
-            focal_px: 0.8 * chosen.focal_px,
+            focal_px: 0.9 * chosen.focal_px,
             cx: 300.5,
             cy: 190.0,
             disparity_offset_px: 11.5,
