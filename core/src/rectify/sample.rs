@@ -19,7 +19,7 @@ const TILE_COLUMNS: usize = 16;
 const TILE_ROWS: usize = 4;
 
 /// Added to a place, so that cutting it to the weight's bits rounds it.
-const HALF_WEIGHT: i32 = 1 << (PLACE_SHIFT - WEIGHT_SHIFT - 1);
+pub(super) const HALF_WEIGHT: i32 = 1 << (PLACE_SHIFT - WEIGHT_SHIFT - 1);
 
 /// Fills a row and returns its longest run of pixels whose source lies in the picture; the others are 0.
 pub(super) fn sample_row(
@@ -124,34 +124,42 @@ impl<'a> Source<'a> {
         if right - left >= TILE_COLUMNS || bottom - top >= TILE_ROWS {
             return false;
         }
-        let mut tile = [0; TILE_COLUMNS * TILE_ROWS];
-        for (row, to) in (top..=bottom).zip(tile.as_chunks_mut::<TILE_COLUMNS>().0) {
+        // The room behind lets the neighbours of any pixel be read without a check.
+        let mut tile = [0; TILE_COLUMNS * TILE_ROWS + TILE_COLUMNS + 2];
+        // Always all rows: a branch on how many are needed would be guessed wrong too often.
+        for (row, to) in (top..).zip(tile.as_chunks_mut::<TILE_COLUMNS>().0.iter_mut().take(TILE_ROWS)) {
+            let row = row.min(self.last[1] as usize);
             let bytes = self.data.get(row * self.stride + left..).and_then(|rest| rest.first_chunk());
             let Some(bytes) = bytes else { return false };
             *to = *bytes;
         }
 
-        // Arrays of 16-bit numbers, one step at a time: this becomes vector instructions.
-        let (mut upper, mut lower) = ([[0_u16; STEP]; 2], [[0_u16; STEP]; 2]);
-        let (mut across, mut down) = ([0_u16; STEP], [0_u16; STEP]);
+        // Arrays of 16-bit numbers, one step at a time: this becomes vector instructions. Places in the tile fit 16 bits.
+        let from = [start[0] - ((left as i32) << PLACE_SHIFT), start[1] - ((top as i32) << PLACE_SHIFT)];
+        let places: [[u16; STEP]; 2] = [0, 1]
+            .map(|i| core::array::from_fn(|k| (from[i] as u16).wrapping_add((slope[i] as u16).wrapping_mul(k as u16))));
+        let cells = places.map(|axis| axis.map(|p| p >> PLACE_SHIFT));
+        let firsts: [u16; STEP] = core::array::from_fn(|k| cells[1][k] * TILE_COLUMNS as u16 + cells[0][k]);
+        let pairs = |offset: usize| {
+            let pair = |k: usize| {
+                // The remainder changes nothing; it says to the compiler that the index lies in the tile.
+                let index = usize::from(firsts[k]) % (TILE_COLUMNS * TILE_ROWS) + offset;
+                u16::from_le_bytes([tile[index], tile[index + 1]])
+            };
+            // Written out, the pairs go straight into a vector register; `map` would take them through memory.
+            [pair(0), pair(1), pair(2), pair(3), pair(4), pair(5), pair(6), pair(7)]
+        };
+        let (upper, lower) = (pairs(0), pairs(TILE_COLUMNS));
+        let [across, down] = places.map(|axis| axis.map(|p| p >> (PLACE_SHIFT - WEIGHT_SHIFT) & (WEIGHT_ONE - 1)));
         for k in 0..STEP {
-            let [x, y] = [0, 1].map(|i| start[i] + slope[i] * k as i32);
-            (across[k], down[k]) = (weight(x), weight(y));
-            let column = (x >> PLACE_SHIFT) as usize - left;
-            let first = ((y >> PLACE_SHIFT) as usize - top) * TILE_COLUMNS + column;
-            // The places lie in the tile, as seen above; the remainder says so to the compiler.
-            let pixel = |offset: usize| u16::from(tile[(first + offset) % tile.len()]);
-            (upper[0][k], upper[1][k]) = (pixel(0), pixel(1));
-            (lower[0][k], lower[1][k]) = (pixel(TILE_COLUMNS), pixel(TILE_COLUMNS + 1));
-        }
-        for k in 0..STEP {
-            out[k] = blend([upper[0][k], upper[1][k]], [lower[0][k], lower[1][k]], across[k], down[k]);
+            let [upper, lower] = [upper[k], lower[k]].map(|pair| [pair & 0xff, pair >> 8]);
+            out[k] = blend(upper, lower, across[k], down[k]);
         }
         true
     }
 
     /// The pixel at any place, `None` outside of the picture.
-    fn at(&self, [x, y]: [i32; 2]) -> Option<u8> {
+    pub(super) fn at(&self, [x, y]: [i32; 2]) -> Option<u8> {
         let cell = [x >> PLACE_SHIFT, y >> PLACE_SHIFT];
         let (across, down) = (weight(x), weight(y));
         // On the last column and row itself there is a pixel, beyond there is not.
