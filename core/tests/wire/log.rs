@@ -4,19 +4,23 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use fencepost_core::map::{CellState, MapGeometry};
-use fencepost_core::wire::{CommandEncoder, FrameFormat, Status, VehicleMotionRepr};
+use fencepost_core::wire::{CommandEncoder, FrameFormat, Status, VehicleMotionRepr, WireConfig, WireSettings};
 
-use super::{RUNNING, Random, SMALL, World, encoder};
+use super::{Encoder, RUNNING, Random, SMALL, World};
 
-/// Files `wire_classic.log`, `wire_fd.log` and their `.csv` lie in `CARGO_TARGET_TMPDIR` afterwards.
+/// Files `wire_classic.log`, `wire_fd.log`, `wire_truncated.log` and their `.csv` lie in `CARGO_TARGET_TMPDIR` afterwards.
 #[test]
 fn write_a_log_for_an_independent_decoder() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    for (format, name, geometry) in
-        [(FrameFormat::Classic, "wire_classic", SMALL), (FrameFormat::Fd, "wire_fd", MapGeometry::default())]
-    {
+    let logs = [
+        (FrameFormat::Classic, 255, "wire_classic", SMALL),
+        (FrameFormat::Fd, 255, "wire_fd", MapGeometry::default()),
+        (FrameFormat::Classic, 6, "wire_truncated", SMALL),
+    ];
+    for (format, max_cell_frames, name, geometry) in logs {
         let mut random = Random::new(40);
-        let mut encoder = encoder(format);
+        let settings = WireSettings { format, max_cell_frames, ..WireSettings::CLASSIC };
+        let mut encoder = Encoder::new(WireConfig::new(settings).unwrap()).unwrap();
         let mut controller = CommandEncoder::new(encoder.config().address());
         let (mut log, mut csv) = (String::new(), String::from("frame,timestamp_ns,x_m,y_m,state,pixels\n"));
         for frame in 0..40_u16 {
