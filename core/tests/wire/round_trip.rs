@@ -4,7 +4,8 @@ use fencepost_core::health::HealthLevel;
 use fencepost_core::map::{CellState, MapGeometry};
 use fencepost_core::wire::{
     Command, CommandEncoder, CommandReceiver, Frame, FrameFormat, GroundRepr, MAX_RUN_LENGTH, Message, NoScan,
-    NodeState, Received, Run, ScanEncoder, Status, VehicleMotionRepr, WireConfig, WireSettings, scan_low,
+    NodeState, Received, Run, ScanEncoder, Status, VehicleMotionRepr, WireConfig, WireSettings, max_bits_per_scan,
+    max_frames_per_scan, max_load_permille, scan_low,
 };
 
 use super::{CellSet, Encoder, Frames, RUNNING, Random, Receiver, SMALL, World, cell_set, config, encoder, receiver};
@@ -81,8 +82,11 @@ fn an_empty_scan_sends_a_header_and_an_end() {
     check(FrameFormat::Classic, &[world]);
 }
 
+/// A run in the order of sending: whether it is free, distance squared in half cells, first cell, and its cells.
+type PlainRun = (bool, i32, i8, i8, Vec<(i8, i8, bool)>);
+
 /// Runs of a world the plain way: cell by cell, then sorted by what the documentation says.
-fn plain_runs(world: &World) -> Vec<(bool, i32, i8, i8, Vec<(i8, i8, bool)>)> {
+fn plain_runs(world: &World) -> Vec<PlainRun> {
     let geometry = &world.geometry;
     let mut runs: Vec<Vec<(i8, i8, bool)>> = Vec::new();
     for i in geometry.x_first..geometry.x_first + geometry.x_count as i16 {
@@ -382,4 +386,31 @@ fn the_bytes_of_a_scan_stay_what_they_are() {
     encoder.encode(&world.scan(), &mut out).unwrap();
     let lines = out.iter().map(|frame| format!("{frame:?}\n")).collect::<String>();
     assert_eq!(lines, include_str!("scan.golden"), "\n{lines}");
+}
+
+#[test]
+fn the_bus_load_in_the_documentation_is_that_of_the_code() {
+    let page = include_str!("../../../docs/wire.md");
+    let rows = page.lines().filter(|line| line.ends_with("% |")).collect::<Vec<_>>();
+    assert_eq!(rows.len(), 6);
+    for row in rows {
+        let columns = row.trim_matches('|').split('|').map(str::trim).collect::<Vec<_>>();
+        let (frames, format) = columns[0].split_once(' ').unwrap();
+        let format = if format.starts_with("FD") { FrameFormat::Fd } else { FrameFormat::Classic };
+        let settings = WireSettings { format, max_cell_frames: frames.parse().unwrap(), ..WireSettings::CLASSIC };
+        let config = WireConfig::new(settings).unwrap();
+        let load = |bitrate| {
+            let permille = max_load_permille(&config, bitrate, 10);
+            format!("{}.{} %", permille / 10, permille % 10)
+        };
+        let expected = [
+            config.max_runs().to_string(),
+            max_frames_per_scan(&config).to_string(),
+            max_bits_per_scan(&config).to_string(),
+            load(250_000),
+            load(500_000),
+            load(1_000_000),
+        ];
+        assert_eq!(columns[1..], expected, "{row}");
+    }
 }
