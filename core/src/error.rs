@@ -23,6 +23,11 @@ pub enum ConfigProblem {
     },
     /// An odd number is needed.
     NotOdd,
+    /// A whole multiple of another number is needed.
+    NotAMultiple {
+        /// The number that it must be a multiple of.
+        of: u32,
+    },
     /// More than this build of the detector has room for.
     OverCapacity {
         /// What was asked for.
@@ -69,6 +74,7 @@ impl core::fmt::Display for ConfigProblem {
             Self::NotFinite => write!(f, "is not a finite number"),
             Self::OutOfRange { min, max } => write!(f, "must lie within {min} to {max}"),
             Self::NotOdd => write!(f, "must be odd"),
+            Self::NotAMultiple { of } => write!(f, "must be a multiple of {of}"),
             Self::OverCapacity { needed, capacity } => {
                 write!(f, "needs {needed}, but this build has room for {capacity}")
             }
