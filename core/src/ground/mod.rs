@@ -17,8 +17,8 @@ use crate::{
 /// Rounds of choosing the surfaces near the plane and fitting it again. The choice settles after two or three.
 const REFINEMENTS: usize = 4;
 
-/// Regions that are tried, largest first, before a frame is said to have no ground.
-const ATTEMPTS: usize = 4;
+/// Regions that a plane is grown from, largest first.
+const REGIONS: usize = 3;
 
 /// Finds the ground plane from the near-horizontal surfaces.
 ///
@@ -95,50 +95,77 @@ impl GroundFinder {
         let reach = if self.height_known { self.settings.height_tolerance_m } else { f32::INFINITY };
         let level = if self.height_known { 0.0 } else { f32::NEG_INFINITY };
         let allowance = reach + slope * libm::sqrtf(x * x + y * y);
-        surface.class == SurfaceClass::Horizontal && z <= allowance && z >= level - allowance
+        let near = x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m;
+        surface.class == SurfaceClass::Horizontal && near && z <= allowance && z >= level - allowance
     }
 
+    /// The plane that the most ground lies on, of those that grow from the largest regions, from the last plane and from
+    /// what the mount promises.
     fn find<const SURFACES: usize>(
         &self,
         table: &[Surface],
         regions: &Regions<SURFACES>,
         frame: &VehicleFrame,
     ) -> Option<GroundPlane> {
+        let mut best: Option<(f32, GroundPlane)> = None;
+        let mut attempt = |seed: Option<GroundPlane>| {
+            let grown = seed.and_then(|seed| self.grow(seed, table, frame));
+            if let Some((weight, plane)) = grown.filter(|(weight, _)| best.is_none_or(|(most, _)| *weight > most)) {
+                best = Some((weight, plane));
+            }
+        };
+        attempt(self.last);
+        attempt(self.height_known.then(|| GroundPlane::of_mount(frame)));
         let mut below = f32::INFINITY;
-        for _ in 0..ATTEMPTS {
+        for _ in 0..REGIONS {
             // The largest region that was not tried yet; the first of equals.
-            let mut best: Option<Scatter> = None;
+            let mut largest: Option<Scatter> = None;
             for root in regions.roots() {
                 if !table.get(root).is_some_and(|surface| self.may_be_ground(surface)) {
                     continue;
                 }
                 let members = regions.members(root).filter_map(|place| table.get(place));
-                let region = members.fold(Scatter::default(), |all, surface| all.joined(&surface.points));
-                if region.weight < below && best.is_none_or(|best| region.weight > best.weight) {
-                    best = Some(region);
+                let region = members.fold(Scatter::default(), |all, surface| all.joined(&self.weighed(surface)));
+                if region.weight < below && largest.is_none_or(|largest| region.weight > largest.weight) {
+                    largest = Some(region);
                 }
             }
-            let region = best.filter(|region| region.weight >= self.min_support)?;
+            let Some(region) = largest else { break };
             below = region.weight;
-            if let Some(plane) = GroundPlane::through(&region, frame).and_then(|plane| self.refine(plane, table, frame))
-            {
-                return Some(plane);
-            }
+            attempt(GroundPlane::through(&region, frame));
         }
-        None
+        best.map(|(_, plane)| plane)
     }
 
-    /// Fits the plane anew to all surfaces near it, until it is within the limits or is given up.
-    fn refine(&self, mut plane: GroundPlane, table: &[Surface], frame: &VehicleFrame) -> Option<GroundPlane> {
+    /// Fits the plane anew to all surfaces that lie on it, a few times; `None` if it leaves the limits. Also says how much
+    /// lies on it.
+    fn grow(&self, mut plane: GroundPlane, table: &[Surface], frame: &VehicleFrame) -> Option<(f32, GroundPlane)> {
+        let mut weight = 0.0;
         for round in 0..REFINEMENTS {
-            // A first plane may be bent by what is not ground: it is forgiven more.
-            let slack = if round == 0 { 2.0 } else { 1.0 };
-            let near =
+            // A first plane may be bent by what is not ground, or come from an earlier frame: it is forgiven more.
+            let slack = if round == 0 { 2.5 } else { 1.0 };
+            let on_it =
                 table.iter().filter(|surface| self.may_be_ground(surface) && self.lies_on(&plane, surface, slack));
-            let points = near.fold(Scatter::default(), |all, surface| all.joined(&surface.points));
-            plane = GroundPlane::through(&points, frame)?;
+            let mut support = 0;
+            let mut points = Scatter::default();
+            for surface in on_it {
+                support += surface.pixels();
+                points = points.joined(&self.weighed(surface));
+            }
+            plane = GroundPlane { support, ..GroundPlane::through(&points, frame)? };
+            weight = points.weight;
         }
-        self.plausible(&plane).then_some(plane)
+        self.plausible(&plane).then_some((weight, plane))
+    }
+
+    /// The points of a surface with the weight that their heights deserve. The height of a point on the ground is as
+    /// uncertain as its distance is long (the error of the distance grows with its square, the slope of the ray falls with
+    /// it), so the weight falls with the square; and it falls to the sides, where the road does not lead.
+    fn weighed(&self, surface: &Surface) -> Scatter {
+        let [x, y, _] = surface.points.mean_m;
+        let aside = y / self.settings.corridor_m;
+        let weight = surface.points.weight / ((1.0 + x * x + y * y) * (1.0 + aside * aside));
+        Scatter { weight, ..surface.points }
     }
 
     fn lies_on(&self, plane: &GroundPlane, surface: &Surface, slack: f32) -> bool {

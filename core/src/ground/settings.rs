@@ -15,6 +15,10 @@ pub struct GroundSettings {
     pub surface_tolerance_m: f32,
     /// Allowance on top of it for each metre of range, metres: distances are less certain there, and the ground bends.
     pub surface_tolerance_per_m: f32,
+    /// Surfaces farther away say nothing about the plane, metres: roads bend there, and their heights are uncertain.
+    pub max_range_m: f32,
+    /// Surfaces this far to the side count half, metres: the plane is that of the ground ahead, not that of the verges.
+    pub corridor_m: f32,
     /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
     pub min_support_permille: f32,
     /// Frames for which the last plane is held when a frame has none.
@@ -28,6 +32,8 @@ impl GroundSettings {
         height_tolerance_m: 0.0,
         surface_tolerance_m: 0.0,
         surface_tolerance_per_m: 0.0,
+        max_range_m: 0.0,
+        corridor_m: 0.0,
         min_support_permille: 0.0,
         hold_frames: 0,
     };
@@ -41,6 +47,8 @@ impl GroundSettings {
         ConfigError::check("ground.height_tolerance_m", self.height_tolerance_m, 0.0, 20.0)?;
         ConfigError::check("ground.surface_tolerance_m", self.surface_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.surface_tolerance_per_m", self.surface_tolerance_per_m, 0.0, 0.5)?;
+        ConfigError::check("ground.max_range_m", self.max_range_m, 1.0, 1000.0)?;
+        ConfigError::check("ground.corridor_m", self.corridor_m, 0.1, 1000.0)?;
         ConfigError::check("ground.min_support_permille", self.min_support_permille, 0.0, 1000.0)?;
         ConfigError::check("ground.hold_frames", f32::from(self.hold_frames), 0.0, 1000.0)
     }
@@ -51,9 +59,11 @@ impl Default for GroundSettings {
         Self {
             max_tilt_deg: 20.0,
             height_tolerance_m: 0.5,
-            surface_tolerance_m: 0.08,
-            surface_tolerance_per_m: 0.01,
-            min_support_permille: 5.0,
+            surface_tolerance_m: 0.05,
+            surface_tolerance_per_m: 0.004,
+            max_range_m: 25.0,
+            corridor_m: 2.5,
+            min_support_permille: 2.0,
             hold_frames: 10,
         }
     }

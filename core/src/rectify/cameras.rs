@@ -16,6 +16,9 @@ const SIDE_POINTS: u16 = 33;
 /// A side is taken this far inside the picture, px: between the points tried it may bulge inwards.
 const SIDE_INSET_PX: f32 = 0.5;
 
+/// No lens of this model sees more than 83 degrees to each side; more comes of sides that its polynomial does not reach.
+const MAX_EXTENT: f32 = 16.0;
+
 type Matrix = [[f32; 3]; 3];
 
 /// The way from a pixel of the rectified picture to its place in the raw one.
@@ -181,7 +184,7 @@ fn choose(raw: &RawPair, lenses: &[Lens; 2]) -> Result<Rectification, ConfigErro
     view.cut(&raw.right, &lenses[1], &right_rotation);
     let last = [raw.left.width as f32 - 1.0, raw.left.height as f32 - 1.0];
     let extent = [view.high[0] - view.low[0], view.high[1] - view.low[1]];
-    let (focal_px, middle) = if extent.iter().all(|e| e.is_finite() && *e > 0.01) {
+    let (focal_px, middle) = if extent.iter().all(|e| (0.01..MAX_EXTENT).contains(e)) {
         let focal_px = (last[0] / extent[0]).max(last[1] / extent[1]);
         (focal_px, [0, 1].map(|i| 0.5 * (view.low[i] + view.high[i])))
     } else {

@@ -7,12 +7,19 @@ use crate::picture::Picture;
 use super::grid::{PLACE_SHIFT, STEP, Segment};
 
 /// Fraction bits of the bilinear weights: 1/64 px, which moves an edge by less than the map's own error, and small enough
-/// that one direction fits 16 bits.
-const WEIGHT_SHIFT: u32 = 6;
-const WEIGHT_ONE: u32 = 1 << WEIGHT_SHIFT;
+/// that sums fit 16 bits.
+pub(super) const WEIGHT_SHIFT: u32 = 6;
+const WEIGHT_ONE: u16 = 1 << WEIGHT_SHIFT;
+
+/// Bits dropped between both directions, so that the second still fits 16 bits: quarters of a grey level remain.
+const DROPPED: u32 = 4;
+
+/// Columns and rows that the pixels of one segment are read from, at most.
+const TILE_COLUMNS: usize = 16;
+const TILE_ROWS: usize = 4;
 
 /// Added to a place, so that cutting it to the weight's bits rounds it.
-const HALF_WEIGHT: i32 = 1 << (PLACE_SHIFT - WEIGHT_SHIFT - 1);
+pub(super) const HALF_WEIGHT: i32 = 1 << (PLACE_SHIFT - WEIGHT_SHIFT - 1);
 
 /// Fills a row and returns its longest run of pixels whose source lies in the picture; the others are 0.
 pub(super) fn sample_row(
@@ -33,13 +40,11 @@ pub(super) fn sample_row(
             continue;
         };
         let mut place = segment.start.map(|p| p.wrapping_add(HALF_WEIGHT));
-        if let (true, Ok(chunk)) = (source.holds_whole(place, segment.slope), <&mut [u8; STEP]>::try_from(&mut *chunk))
-        {
-            for pixel in chunk {
-                *pixel = source.inner(place);
-                place = step(place, segment.slope);
-            }
-        } else {
+        let whole = match <&mut [u8; STEP]>::try_from(&mut *chunk) {
+            Ok(chunk) => source.fill_inside(place, segment.slope, chunk),
+            Err(_) => false,
+        };
+        if !whole {
             for (index, pixel) in chunk.iter_mut().enumerate() {
                 if let Some(value) = source.at(place) {
                     *pixel = value;
@@ -103,36 +108,62 @@ impl<'a> Source<'a> {
         Self { data: picture.data(), stride: picture.stride(), last }
     }
 
-    /// Whether all pixels of a segment have four neighbours in the picture: those at both ends tell, as it is straight.
-    fn holds_whole(&self, start: [i32; 2], slope: [i32; 2]) -> bool {
-        (0..2).all(|i| {
-            let end = start[i].wrapping_add(slope[i].wrapping_mul(STEP as i32 - 1));
-            let limit = self.last[i] << PLACE_SHIFT;
-            start[i].min(end) >= 0 && start[i].max(end) < limit
-        })
-    }
-
-    /// The pixel at a place that [`Self::holds_whole`].
+    /// Fills a whole segment, if all of its pixels have four neighbours in the picture and lie in a tile; otherwise leaves
+    /// it to [`Self::at`]. Gives the same bits.
     ///
-    /// Two neighbours share a register, 16 bits each: weighting them down the column takes one multiplication for both.
-    fn inner(&self, [x, y]: [i32; 2]) -> u8 {
-        let first = (y >> PLACE_SHIFT) as usize * self.stride + (x >> PLACE_SHIFT) as usize;
-        let pair = |index: usize| {
-            let bytes = self.data.get(index..).and_then(|rest| rest.first_chunk::<2>());
-            let both = bytes.map_or(0, |b| u32::from(u16::from_le_bytes(*b)));
-            (both | both << 8) & 0x00ff_00ff
+    /// With the neighbours in a tile of fixed size, nothing has to be checked per pixel and all eight are blended at once.
+    fn fill_inside(&self, start: [i32; 2], slope: [i32; 2], out: &mut [u8; STEP]) -> bool {
+        // A segment is straight: its ends tell.
+        let end: [i32; 2] = core::array::from_fn(|i| start[i].wrapping_add(slope[i].wrapping_mul(STEP as i32 - 1)));
+        let [low, high] = [[0, 1].map(|i| start[i].min(end[i])), [0, 1].map(|i| start[i].max(end[i]))];
+        if low[0] < 0 || low[1] < 0 || (0..2).any(|i| high[i] >= self.last[i] << PLACE_SHIFT) {
+            return false;
+        }
+        let [left, top] = low.map(|p| (p >> PLACE_SHIFT) as usize);
+        let [right, bottom] = high.map(|p| (p >> PLACE_SHIFT) as usize + 1);
+        if right - left >= TILE_COLUMNS || bottom - top >= TILE_ROWS {
+            return false;
+        }
+        // The room behind lets the neighbours of any pixel be read without a check.
+        let mut tile = [0; TILE_COLUMNS * TILE_ROWS + TILE_COLUMNS + 2];
+        // Always all rows: a branch on how many are needed would be guessed wrong too often.
+        for (row, to) in (top..).zip(tile.as_chunks_mut::<TILE_COLUMNS>().0.iter_mut().take(TILE_ROWS)) {
+            let row = row.min(self.last[1] as usize);
+            let bytes = self.data.get(row * self.stride + left..).and_then(|rest| rest.first_chunk());
+            let Some(bytes) = bytes else { return false };
+            *to = *bytes;
+        }
+
+        // Arrays of 16-bit numbers, one step at a time: this becomes vector instructions. Places in the tile fit 16 bits.
+        let from = [start[0] - ((left as i32) << PLACE_SHIFT), start[1] - ((top as i32) << PLACE_SHIFT)];
+        let places: [[u16; STEP]; 2] = [0, 1]
+            .map(|i| core::array::from_fn(|k| (from[i] as u16).wrapping_add((slope[i] as u16).wrapping_mul(k as u16))));
+        let cells = places.map(|axis| axis.map(|p| p >> PLACE_SHIFT));
+        let firsts: [u16; STEP] = core::array::from_fn(|k| cells[1][k] * TILE_COLUMNS as u16 + cells[0][k]);
+        let pairs = |offset: usize| {
+            let pair = |k: usize| {
+                // The remainder changes nothing; it says to the compiler that the index lies in the tile.
+                let index = usize::from(firsts[k]) % (TILE_COLUMNS * TILE_ROWS) + offset;
+                u16::from_le_bytes([tile[index], tile[index + 1]])
+            };
+            // Written out, the pairs go straight into a vector register; `map` would take them through memory.
+            [pair(0), pair(1), pair(2), pair(3), pair(4), pair(5), pair(6), pair(7)]
         };
-        let (across, down) = (weight(x), weight(y));
-        let column = pair(first) * (WEIGHT_ONE - down) + pair(first + self.stride) * down;
-        blend(column & 0xffff, column >> 16, across)
+        let (upper, lower) = (pairs(0), pairs(TILE_COLUMNS));
+        let [across, down] = places.map(|axis| axis.map(|p| p >> (PLACE_SHIFT - WEIGHT_SHIFT) & (WEIGHT_ONE - 1)));
+        for k in 0..STEP {
+            let [upper, lower] = [upper[k], lower[k]].map(|pair| [pair & 0xff, pair >> 8]);
+            out[k] = blend(upper, lower, across[k], down[k]);
+        }
+        true
     }
 
     /// The pixel at any place, `None` outside of the picture.
-    fn at(&self, [x, y]: [i32; 2]) -> Option<u8> {
+    pub(super) fn at(&self, [x, y]: [i32; 2]) -> Option<u8> {
         let cell = [x >> PLACE_SHIFT, y >> PLACE_SHIFT];
         let (across, down) = (weight(x), weight(y));
         // On the last column and row itself there is a pixel, beyond there is not.
-        let inside = |i: usize, weight: u32| {
+        let inside = |i: usize, weight: u16| {
             cell[i] >= 0 && (cell[i] < self.last[i] || (cell[i] == self.last[i] && weight == 0))
         };
         if !inside(0, across) || !inside(1, down) {
@@ -140,19 +171,24 @@ impl<'a> Source<'a> {
         }
         let pixel = |dx: i32, dy: i32| {
             let (x, y) = ((cell[0] + dx).min(self.last[0]), (cell[1] + dy).min(self.last[1]));
-            self.data.get(y as usize * self.stride + x as usize).map(|p| u32::from(*p))
+            self.data.get(y as usize * self.stride + x as usize).map(|p| u16::from(*p))
         };
-        let column = |dx: i32| Some(pixel(dx, 0)? * (WEIGHT_ONE - down) + pixel(dx, 1)? * down);
-        Some(blend(column(0)?, column(1)?, across))
+        Some(blend([pixel(0, 0)?, pixel(1, 0)?], [pixel(0, 1)?, pixel(1, 1)?], across, down))
     }
 }
 
-fn weight(place: i32) -> u32 {
-    (place >> (PLACE_SHIFT - WEIGHT_SHIFT)) as u32 % WEIGHT_ONE
+fn weight(place: i32) -> u16 {
+    (place >> (PLACE_SHIFT - WEIGHT_SHIFT)) as u16 % WEIGHT_ONE
 }
 
-/// Blends two sums that carry a weight already, and rounds.
-fn blend(left: u32, right: u32, across: u32) -> u8 {
-    let sum = left * (WEIGHT_ONE - across) + right * across;
-    ((sum + (1 << (2 * WEIGHT_SHIFT - 1))) >> (2 * WEIGHT_SHIFT)) as u8
+/// Blends four neighbours, left and right of two rows, rounding twice. No sum exceeds 65408.
+#[inline(always)]
+fn blend(upper: [u16; 2], lower: [u16; 2], across: u16, down: u16) -> u8 {
+    let [left, right] = [0, 1].map(|i| {
+        let sum = upper[i].wrapping_mul(WEIGHT_ONE - down).wrapping_add(lower[i].wrapping_mul(down));
+        sum.wrapping_add(1 << (DROPPED - 1)) >> DROPPED
+    });
+    let sum = left.wrapping_mul(WEIGHT_ONE - across).wrapping_add(right.wrapping_mul(across));
+    const LAST: u32 = 2 * WEIGHT_SHIFT - DROPPED;
+    (sum.wrapping_add(1 << (LAST - 1)) >> LAST) as u8
 }

@@ -103,6 +103,8 @@ pub struct ReceiverStatistics {
     pub abandoned_scans: u32,
     /// Scans whose header was not newer than the newest scan.
     pub old_scans: u32,
+    /// Parts of scans that were not being received: their header is missing, or they were given up.
+    pub stray_parts: u32,
     /// Scans missing between whole ones, by their indices.
     pub missed_scans: u32,
     /// Messages missing by their counters: at least that many.
@@ -163,6 +165,7 @@ impl<const RUNS: usize> ScanReceiver<RUNS> {
             scans: 0,
             abandoned_scans: 0,
             old_scans: 0,
+            stray_parts: 0,
             missed_scans: 0,
             lost: 0,
             repeated: 0,
@@ -250,7 +253,8 @@ impl<const RUNS: usize> ScanReceiver<RUNS> {
             Ok(Received::Scan { .. }) => count(&mut statistics.scans, 1),
             Ok(Received::Repeated) => count(&mut statistics.repeated, 1),
             Ok(Received::Old) => count(&mut statistics.old_scans, 1),
-            Ok(_) => {}
+            Ok(Received::Waiting) => count(&mut statistics.stray_parts, 1),
+            Ok(Received::NotOurs | Received::Heartbeat | Received::Part | Received::Abandoned(_)) => {}
             Err(ReceiveError::Packet(PacketError::WrongCrc)) => count(&mut statistics.crc_errors, 1),
             Err(_) => count(&mut statistics.refused, 1),
         }

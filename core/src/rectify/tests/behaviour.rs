@@ -1,5 +1,7 @@
 //! What users of the rectifier can rely on, and what it refuses.
 
+extern crate std;
+
 use std::{boxed::Box, println, vec, vec::Vec};
 
 use super::{Random, camera, made_up, turned};
@@ -7,7 +9,12 @@ use crate::{
     error::{ConfigError, ConfigProblem},
     geometry::{CameraModel, Distortion, RawPair, Rectification, RectifiedPair, StereoCalibration},
     picture::Picture,
-    rectify::{Rectifier, Side, grid_nodes},
+    rectify::{
+        Rectifier, Side,
+        grid::STEP,
+        grid_nodes,
+        sample::{HALF_WEIGHT, Source},
+    },
 };
 
 const GRID: usize = grid_nodes(640, 480);
@@ -120,6 +127,61 @@ fn grey_values_are_bilinear() {
         assert!(worst < 1.8, "{name}: {worst}");
     }
 }
+
+/// Eight pixels at once give what one after the other gives.
+#[test]
+fn whole_segments_are_as_their_pixels() {
+    for (name, raw) in made_up() {
+        let rectifier = rectifier(&StereoCalibration::Raw(raw));
+        let (width, height) = (512, 384);
+        let pixels = noise(&mut Random(SEED), width * height);
+        let picture = Picture::packed(&pixels, width, height).unwrap();
+        let source = Source::new(&picture, (width, height));
+        let mut out = vec![0; width];
+        for y in 0..height {
+            let span = rectifier.row(Side::Left, &picture, y, &mut out);
+            let segments: Vec<_> = rectifier.left.grid.segments(y).collect();
+            for x in span {
+                let segment = segments[x / STEP].unwrap();
+                let place = [0, 1].map(|i| segment.start[i] + segment.slope[i] * (x % STEP) as i32 + HALF_WEIGHT);
+                assert_eq!(Some(out[x]), source.at(place), "{name} ({x}, {y})");
+            }
+        }
+    }
+}
+
+/// The same bits on every processor: FNV-1a over both rectified pictures and the chosen cameras.
+#[test]
+fn the_bits_are_the_same_everywhere() {
+    let found = made_up().map(|(name, raw)| {
+        let rectifier = rectifier(&StereoCalibration::Raw(raw));
+        let pixels = noise(&mut Random(SEED), 512 * 384);
+        let picture = Picture::packed(&pixels, 512, 384).unwrap();
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let mut add = |bytes: &[u8]| {
+            for byte in bytes {
+                hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+            }
+        };
+        let pair = rectifier.pair();
+        for value in [pair.focal_px, pair.cx, pair.cy, pair.baseline_m] {
+            add(&value.to_bits().to_le_bytes());
+        }
+        let mut out = [0; 512];
+        for side in [Side::Left, Side::Right] {
+            for y in 0..384 {
+                rectifier.row(side, &picture, y, &mut out);
+                add(&out);
+            }
+        }
+        println!("{name}: {hash:#018x}");
+        hash
+    });
+    assert_eq!(found, GOLDEN);
+}
+
+const GOLDEN: [u64; 5] =
+    [0x6dd0_64f2_6f90_e6b1, 0x5ead_8bf2_6b4f_11a1, 0x58a1_fca2_c63d_8556, 0xa609_670a_e5dc_a37c, 0x8a28_686e_e6b2_1ae8];
 
 /// A strong lens folds far outside of the picture; what lies behind the fold must not come out as valid.
 #[test]

@@ -1,8 +1,10 @@
 //! Recordings in the EuRoC layout, where they are at hand.
 
+extern crate std;
+
 use std::{
-    env, eprintln, format, fs,
-    io::BufReader,
+    env, format, fs,
+    io::{BufReader, Write},
     path::{Path, PathBuf},
     string::String,
     vec,
@@ -22,7 +24,9 @@ pub(super) fn find(name: &str) -> Option<PathBuf> {
     if folder.join("mav0").is_dir() {
         return Some(folder);
     }
-    eprintln!(
+    // Written straight to the stream: the test harness keeps what the macros print of tests that pass.
+    let _ = writeln!(
+        std::io::stderr(),
         "NOT RUN: no recording at {}. euroc-room: 12 pairs of a Vicon room sequence of the EuRoC MAV dataset (ETH Zurich); \
          k10-rover: the K10 pair of NASA's StereoPipeline examples. Set FENCEPOST_RECORDINGS to the folder that holds them.",
         folder.display()
