@@ -174,7 +174,9 @@ fn every_error_names_file_and_field_and_says_the_mend() {
     let opencv = |old: &str, new: &str| vec![("calib.yml", with(&whole, old, new))];
     let ros = |old: &str, new: &str| vec![("left.yaml", with(&left, old, new)), ("right.yaml", right.clone())];
     let t = translation(&whole);
-    let cases: Vec<(Vec<(&str, String)>, &str, &str, Is)> = vec![
+    let swapped = whole.replace("\nR1:", "\nR:1").replace("\nR2:", "\nR1:").replace("\nR:1", "\nR2:");
+    type Case<'a> = (Vec<(&'a str, String)>, &'a str, &'a str, Is);
+    let cases: Vec<Case<'_>> = vec![
         (kitti("P1:", "P9:"), "calib.txt", "P1", |p| matches!(p, P::Missing)),
         (kitti("P0: 5e+02", "P0: NaN"), "calib.txt", "P0", |p| matches!(p, P::NotFinite)),
         (kitti("P0: 5e+02", "P0: 0"), "calib.txt", "P0", |p| matches!(p, P::FocalLength(_))),
@@ -205,6 +207,8 @@ fn every_error_names_file_and_field_and_says_the_mend() {
         (opencv(&t, "data: [0.1205, 0, 0]"), "calib.yml", "T", |p| matches!(p, P::Exchanged { .. })),
         (opencv(&t, "data: [0, 0, 0]"), "calib.yml", "T", |p| matches!(p, P::NoBaseline { .. })),
         (opencv(&t, "data: [0, -0.12, 0]"), "calib.yml", "T", |p| matches!(p, P::NotSideBySide { .. })),
+        (opencv(&t, "data: [ -120.5, 1.1, -2.3 ]"), "calib.yml", "P2", |p| matches!(p, P::RectificationDiffers { .. })),
+        (vec![("calib.yml", swapped.clone())], "calib.yml", "R1", |p| matches!(p, P::RectificationDiffers { .. })),
         (opencv(&t, "data: [1, 2]"), "calib.yml", "T", |p| matches!(p, P::Shape { .. })),
         (opencv("K1: !!opencv-matrix", "K1: [1, 2"), "calib.yml", "", |p| matches!(p, P::Syntax { .. })),
         (ros("plumb_bob", "equidistant"), "left.yaml", "distortion_model", |p| matches!(p, P::LensModel(_))),
@@ -271,14 +275,15 @@ fn more_than_eight_coefficients_pass_only_as_zeros() {
 #[test]
 fn doubtful_values_are_warned_of() {
     let whole = text("whole.yml");
-    let millimetres = with(&whole, &translation(&whole), "data: [ -120.5, 1.1, -2.3 ]");
+    let pose = text("pose_only.yml");
+    let millimetres = with(&pose, &translation(&pose), "data: [ -120.5, 1.1, -2.3 ]");
     let calibration = parse(&[("calib.yml", &millimetres)]).unwrap();
     assert!(
         matches!(&calibration.warnings[..], [CalibrationWarning::LongBaseline { baseline_m, .. }] if *baseline_m > 120.0),
         "{:?}",
         calibration.warnings
     );
-    assert!(calibration.warnings[0].to_string().contains("divide the translation by 1000"));
+    assert!(calibration.warnings[0].to_string().contains("divide the translation and"));
     let incomplete = parse(&[("calib.yml", &with(&whole, "P2:", "P9:"))]).unwrap();
     assert!(
         matches!(&incomplete.warnings[..], [CalibrationWarning::RectificationIncomplete { missing, .. }] if missing == "P2")

@@ -98,10 +98,14 @@ pub(super) fn parse(
     let translation: [f64; 3] = document.array(field, node, (3, 1), "3x1 = 3 values")?;
     let place = Place { file: document.file, field };
     // The pose before the rectification: of the two it is the one that a user can mend.
-    let pair = pair::raw(place, (left, right), rotation, Vector3::from(translation), None, warnings)?;
-    let rectification = source.rectification(size, warnings)?;
+    let translation = Vector3::from(translation);
+    let pair = pair::raw(place, (left, right), rotation, translation, None, warnings)?;
+    let rectification = source.rectification(size, (&rotation, &translation), warnings)?;
     Ok(RawPair { rectification, ..pair })
 }
+
+/// A size and the file that says it.
+type SizeInFile<'d> = (&'d Path, (u32, u32));
 
 /// Several documents searched as one.
 struct Source<'a, 'd> {
@@ -131,7 +135,7 @@ impl<'a, 'd> Source<'a, 'd> {
         })
     }
 
-    fn size(&self) -> Result<Option<(&'d Path, (u32, u32))>, CalibrationError> {
+    fn size(&self) -> Result<Option<SizeInFile<'d>>, CalibrationError> {
         if let Some((document, field, node)) = self.find(SIZE) {
             let [width, height] = match (node.get("width"), node.get("height")) {
                 (Some(width), Some(height)) => [document.scalar(field, width)?, document.scalar(field, height)?],
@@ -161,6 +165,7 @@ impl<'a, 'd> Source<'a, 'd> {
     fn rectification(
         &self,
         size: (u32, u32),
+        pose: (&Matrix3<f64>, &Vector3<f64>),
         warnings: &mut Vec<CalibrationWarning>,
     ) -> Result<Option<Rectification>, CalibrationError> {
         const KEYS: [&str; 4] = ["R1", "R2", "P1", "P2"];
@@ -175,11 +180,10 @@ impl<'a, 'd> Source<'a, 'd> {
         };
         let [left, right] = [r1, r2].map(|(document, field, node)| matrix(document, field, node));
         let [p1, p2] = [p1, p2].map(|(document, field, node)| document.array(field, node, (3, 4), "3x4 = 12 values"));
-        Ok(Some(Rectification {
-            left_rotation: pair::rows(&left?),
-            right_rotation: pair::rows(&right?),
-            pair: pair::rectified(r1.0.file, ["P1", "P2"], [p1?, p2?], size, warnings)?,
-        }))
+        let (left, right, p1, p2) = (left?, right?, p1?, p2?);
+        let pair = pair::rectified(r1.0.file, ["P1", "P2"], [p1, p2], size, warnings)?;
+        pair::check_rectification(r1.0.file, [&left, &right], pose, (p1[3] - p2[3]) / p1[0])?;
+        Ok(Some(Rectification { left_rotation: pair::rows(&left), right_rotation: pair::rows(&right), pair }))
     }
 }
 

@@ -9,6 +9,8 @@ use super::error::{CalibrationError, CalibrationProblem, CalibrationWarning};
 
 /// Largest deviation of a rotation matrix that rounding in a file explains.
 const ROTATION_TOLERANCE: f64 = 1.0e-3;
+/// Largest difference between a rectification and its pose that rounding in a file explains.
+const POSE_TOLERANCE: f64 = 1.0e-3;
 /// Baselines above this are not a robot's: most likely millimetres or centimetres. Metres.
 const LONG_BASELINE_M: f64 = 5.0;
 /// Baselines below this cannot be told from none. Metres.
@@ -68,17 +70,15 @@ pub(super) fn camera(
     (width, height): (u32, u32),
 ) -> Result<CameraModel, CalibrationError> {
     let [fx, skew, cx, _, fy, cy, ..] = k;
+    // A skew that matters is a camera matrix stored column by column, or a model that is not ours.
+    place.range(skew, -1.0e-3, 1.0e-3)?;
     Ok(CameraModel {
         width,
         height,
         fx: focal(place, fx)?,
         fy: focal(place, fy)?,
         cx: place.range(cx, -1.0e5, 1.0e5)? as f32,
-        // A skew that matters is a camera matrix stored column by column, or a model that is not ours.
-        cy: {
-            place.range(skew, -1.0e-3, 1.0e-3)?;
-            place.range(cy, -1.0e5, 1.0e5)? as f32
-        },
+        cy: place.range(cy, -1.0e5, 1.0e5)? as f32,
         distortion: Distortion::default(),
     })
 }
@@ -237,8 +237,35 @@ pub(super) fn rectified(
     })
 }
 
+/// Checks that a rectification belongs to the pose: `R1 = R2 R`, and `R2 T` along the row, as long as `P2` says.
+///
+/// # Errors
+/// Of the first of `R1` and `P2` that does not.
+pub(super) fn check_rectification(
+    file: &Path,
+    [left, right]: [&Matrix3<f64>; 2],
+    (rotation, translation): (&Matrix3<f64>, &Vector3<f64>),
+    baseline_m: f64,
+) -> Result<(), CalibrationError> {
+    let from_pose = right * rotation;
+    let pairs = left.iter().zip(from_pose.iter()).map(|(value, from_pose)| ("R1", *value, *from_pose, POSE_TOLERANCE));
+    let shift = right * translation;
+    let expected = [-baseline_m, 0.0, 0.0];
+    let shifts = expected
+        .into_iter()
+        .zip(shift.iter())
+        .map(|(value, from_pose)| ("P2", -value, -from_pose, 10.0 * POSE_TOLERANCE * baseline_m.abs()));
+    match pairs.chain(shifts).find(|(_, value, from_pose, tolerance)| (value - from_pose).abs() > *tolerance) {
+        Some((field, value, from_pose, _)) => {
+            Err(Place { file, field }.error(CalibrationProblem::RectificationDiffers { value, from_pose }))
+        }
+        None => Ok(()),
+    }
+}
+
 fn warn_if_long(place: Place<'_>, baseline_m: f64, warnings: &mut Vec<CalibrationWarning>) {
-    if baseline_m > LONG_BASELINE_M {
+    let said = warnings.iter().any(|warning| matches!(warning, CalibrationWarning::LongBaseline { .. }));
+    if baseline_m > LONG_BASELINE_M && !said {
         warnings.push(CalibrationWarning::LongBaseline { file: place.file.to_owned(), baseline_m });
     }
 }

@@ -169,13 +169,14 @@ fn seconds(timestamp_ns: u64) -> String {
 
 /// `calib.txt`: projection matrices of the left and the right camera.
 ///
-/// The numbers are written in f64, where the product of focal length and baseline is exact: they are read back as they were.
+/// In f64 the product of focal length and baseline is exact, so the numbers are read back as they were. They are plain
+/// decimals, here and in `sensor.yaml`: YAML 1.1 takes `1e2` without a sign for a word.
 fn calib_txt(pair: &RectifiedPair) -> String {
     let (f, cx, cy) = (f64::from(pair.focal_px), f64::from(pair.cx), f64::from(pair.cy));
     let cameras = [(cx, 0.0), (cx + f64::from(pair.disparity_offset_px), -f * f64::from(pair.baseline_m))];
     let mut text = String::new();
     for (index, (cx, shift)) in cameras.into_iter().enumerate() {
-        let _ = writeln!(text, "P{index}: {f:e} 0 {cx:e} {shift:e} 0 {f:e} {cy:e} 0 0 0 1 0");
+        let _ = writeln!(text, "P{index}: {f} 0 {cx} {shift} 0 {f} {cy} 0 0 0 1 0");
     }
     text
 }
@@ -191,8 +192,7 @@ fn sensor_yaml(pair: &RawPair) -> [String; 2] {
 }
 
 fn sensor(camera: &CameraModel, rotation: [[f64; 3]; 3], origin: [f64; 3]) -> String {
-    let rows: Vec<String> =
-        rotation.iter().zip(origin).map(|([a, b, c], d)| format!("{a:e}, {b:e}, {c:e}, {d:e}")).collect();
+    let rows: Vec<String> = rotation.iter().zip(origin).map(|([a, b, c], d)| format!("{a}, {b}, {c}, {d}")).collect();
     let CameraModel { width, height, fx, fy, cx, cy, distortion } = camera;
     let coefficients = distortion.0;
     let used = match coefficients.iter().rposition(|value| *value != 0.0) {
@@ -200,11 +200,11 @@ fn sensor(camera: &CameraModel, rotation: [[f64; 3]; 3], origin: [f64; 3]) -> St
         Some(4) => 5,
         Some(_) => 8,
     };
-    let coefficients: Vec<String> = coefficients.iter().take(used).map(|value| format!("{value:e}")).collect();
+    let coefficients: Vec<String> = coefficients.iter().take(used).map(|value| format!("{value}")).collect();
     format!(
         "%YAML:1.0\nsensor_type: camera\ncomment: body frame = left camera\n\n# camera-to-body\nT_BS:\n  cols: 4\n  rows: 4\n  \
          data: [{},\n         0, 0, 0, 1]\n\nresolution: [{width}, {height}]\ncamera_model: pinhole\n\
-         intrinsics: [{fx:e}, {fy:e}, {cx:e}, {cy:e}] # fu, fv, cu, cv\ndistortion_model: radial-tangential\n\
+         intrinsics: [{fx}, {fy}, {cx}, {cy}] # fu, fv, cu, cv\ndistortion_model: radial-tangential\n\
          distortion_coefficients: [{}]\n",
         rows.join(",\n         "),
         coefficients.join(", ")
