@@ -273,4 +273,36 @@ mod tests {
         assert!(matches!(error, LoggedBusError::Log(_)), "{error}");
         assert!(receiver.receive().unwrap().is_some(), "the frame was sent nevertheless");
     }
+
+    #[test]
+    fn any_bytes_are_read_without_panic() {
+        let log = b"(1436509053.249713) can0 4AA#0102\n(0.5) can0 1F334455##1A5A5\r\n(1.0) vcan0 123#R4\n";
+        let seed = 7;
+        println!("seed {seed}");
+        let mut state: u64 = seed;
+        let mut draw = |below: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) % below) as usize
+        };
+        let (mut good, mut bad) = (0, 0);
+        for _ in 0..20_000 {
+            let mut bytes = log.to_vec();
+            for _ in 0..=draw(3) {
+                let at = draw(bytes.len() as u64);
+                bytes[at] = if draw(2) == 0 { draw(256) as u8 } else { b"#R().\n \xc3\xa90F"[draw(11)] };
+            }
+            for line in parse_candump(&bytes) {
+                match line {
+                    // What is read can be written and is the same when read again, up to the microsecond of the format.
+                    Ok(line) => {
+                        let again: CandumpLine = line.to_string().parse().unwrap();
+                        assert_eq!((again.frame, again.timestamp_ns), (line.frame, line.timestamp_ns / 1_000 * 1_000));
+                        good += 1;
+                    }
+                    Err(_) => bad += 1,
+                }
+            }
+        }
+        assert!(good > 1000 && bad > 1000, "{good} good and {bad} bad lines");
+    }
 }
