@@ -205,6 +205,9 @@ fn every_error_names_file_and_field_and_says_the_mend() {
             matches!(p, P::OutOfRange { .. })
         }),
         (opencv(&t, "data: [0.1205, 0, 0]"), "calib.yml", "T", |p| matches!(p, P::Exchanged { .. })),
+        (kitti("-2.5e+02", "-2.5e+60"), "calib.txt", "P1", |p| matches!(p, P::OutOfRange { .. })),
+        (opencv(&t, "data: [-1e60, 0, 0]"), "calib.yml", "T", |p| matches!(p, P::OutOfRange { .. })),
+        (opencv(&t, "data: [-1e200, 0, 0]"), "calib.yml", "T", |p| matches!(p, P::NotFinite)),
         (opencv(&t, "data: [0, 0, 0]"), "calib.yml", "T", |p| matches!(p, P::NoBaseline { .. })),
         (opencv(&t, "data: [0, -0.12, 0]"), "calib.yml", "T", |p| matches!(p, P::NotSideBySide { .. })),
         (opencv(&t, "data: [ -120.5, 1.1, -2.3 ]"), "calib.yml", "P2", |p| matches!(p, P::RectificationDiffers { .. })),
@@ -225,6 +228,9 @@ fn every_error_names_file_and_field_and_says_the_mend() {
         (vec![("a.yml", String::new())], "a.yml", "", |p| matches!(p, P::Syntax { .. })),
         (vec![("a.yml", "a: &x [1]\nb: *x\n".to_owned())], "a.yml", "", |p| matches!(p, P::Syntax { line: 2, .. })),
         (vec![("a.yml", "[".repeat(100_000))], "a.yml", "", |p| matches!(p, P::Syntax { .. })),
+        (vec![("a.yml", "- ".repeat(100_000))], "a.yml", "", |p| matches!(p, P::Syntax { .. })),
+        (vec![("a.yml", "? ".repeat(100_000))], "a.yml", "", |p| matches!(p, P::Syntax { .. })),
+        (vec![("a.yml", "{a: ".repeat(100_000))], "a.yml", "", |p| matches!(p, P::Syntax { .. })),
         (vec![("a.xml", "<a>".repeat(100_000))], "a.xml", "", |p| matches!(p, P::Syntax { .. })),
         (vec![("a.xml", "<a><b></a>".to_owned())], "a.xml", "", |p| matches!(p, P::Syntax { line: 1, .. })),
     ];
@@ -244,6 +250,15 @@ fn translation(whole: &str) -> String {
     let t = &whole[whole.find("\nT:").unwrap()..];
     let start = t.find("data:").unwrap();
     t[start..=t.find(']').unwrap()].to_owned()
+}
+
+#[test]
+fn cameras_with_pictures_of_different_size_are_no_pair() {
+    let right = with(&text("right.yaml"), "image_width: 640", "image_width: 320");
+    let sources = [(Path::new("left.yaml"), text("left.yaml")), (Path::new("right.yaml"), right)];
+    let error = Calibration::parse(&sources.each_ref().map(|(file, text)| (*file, text.as_str())), None).unwrap_err();
+    assert_eq!(error.problem, CalibrationProblem::SizesDiffer { left: (640, 400), right: (320, 400) });
+    assert_eq!(error.file, Path::new("right.yaml"));
 }
 
 #[test]

@@ -101,6 +101,13 @@ pub enum CalibrationProblem {
     },
     /// Neither the file nor the pictures say how large the pictures are.
     SizeUnknown,
+    /// The pictures of left and right camera have different sizes.
+    SizesDiffer {
+        /// Size of the left camera's pictures, px.
+        left: (u32, u32),
+        /// Size of the right camera's pictures, px.
+        right: (u32, u32),
+    },
     /// The pictures have another size.
     SizeDiffers {
         /// Size in the file, px.
@@ -234,6 +241,9 @@ impl fmt::Display for CalibrationProblem {
             ),
             Self::SizeUnknown => {
                 write!(f, "is missing, and there is no picture to take it from; add image_width and image_height")
+            }
+            Self::SizesDiffer { left: (lw, lh), right: (rw, rh) } => {
+                write!(f, "is {rw} x {rh}, but {lw} x {lh} for the left camera; calibrate both at the same size")
             }
             Self::SizeDiffers { file: (fw, fh), pictures: (pw, ph) } => write!(
                 f,

@@ -13,6 +13,8 @@ const ROTATION_TOLERANCE: f64 = 1.0e-3;
 const POSE_TOLERANCE: f64 = 1.0e-3;
 /// Baselines above this are not a robot's: most likely millimetres or centimetres. Metres.
 const LONG_BASELINE_M: f64 = 5.0;
+/// Baselines above this are none in any unit: 100 m in millimetres.
+const MAX_BASELINE: f64 = 1.0e5;
 /// Baselines below this cannot be told from none. Metres.
 const SHORT_BASELINE_M: f64 = 1.0e-3;
 /// Relative difference of focal lengths that is rounding.
@@ -61,6 +63,16 @@ pub(super) fn size_or_pictures(
         (Some(size), _) | (None, Some(size)) => Ok(size),
         (None, None) => Err(place.error(CalibrationProblem::SizeUnknown)),
     }
+}
+
+/// The size that both cameras have.
+pub(super) fn same_size(
+    place: Place<'_>,
+    left: &CameraModel,
+    right: &CameraModel,
+) -> Result<(u32, u32), CalibrationError> {
+    let (left, right) = ((left.width, left.height), (right.width, right.height));
+    if left == right { Ok(left) } else { Err(place.error(CalibrationProblem::SizesDiffer { left, right })) }
 }
 
 /// A camera from its matrix, row by row.
@@ -153,7 +165,7 @@ pub(super) fn raw(
     if baseline.x < 0.0 {
         return Err(place.error(CalibrationProblem::Exchanged { baseline_m: baseline.x }));
     }
-    warn_if_long(place, baseline.norm(), warnings);
+    check_length(place, baseline.norm(), warnings)?;
     Ok(RawPair {
         left,
         right,
@@ -225,7 +237,7 @@ pub(super) fn rectified(
     if baseline.x < SHORT_BASELINE_M {
         return Err(place.error(CalibrationProblem::NoBaseline { baseline_m: baseline.x }));
     }
-    warn_if_long(place, baseline.x, warnings);
+    check_length(place, baseline.x, warnings)?;
     Ok(RectifiedPair {
         width,
         height,
@@ -263,9 +275,19 @@ pub(super) fn check_rectification(
     }
 }
 
-fn warn_if_long(place: Place<'_>, baseline_m: f64, warnings: &mut Vec<CalibrationWarning>) {
+/// Warns of a baseline that is most likely not in metres.
+///
+/// # Errors
+/// Where it is none in any unit.
+fn check_length(
+    place: Place<'_>,
+    baseline_m: f64,
+    warnings: &mut Vec<CalibrationWarning>,
+) -> Result<(), CalibrationError> {
+    place.range(baseline_m, SHORT_BASELINE_M, MAX_BASELINE)?;
     let said = warnings.iter().any(|warning| matches!(warning, CalibrationWarning::LongBaseline { .. }));
     if baseline_m > LONG_BASELINE_M && !said {
         warnings.push(CalibrationWarning::LongBaseline { file: place.file.to_owned(), baseline_m });
     }
+    Ok(())
 }

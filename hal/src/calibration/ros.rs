@@ -21,14 +21,10 @@ pub(super) fn parse(
     let [left, right] = documents;
     let (left_camera, left_rotation, left_projection) = camera(left, pictures)?;
     let (right_camera, right_rotation, right_projection) = camera(right, pictures)?;
-    let (left_size, right_size) = ((left_camera.width, left_camera.height), (right_camera.width, right_camera.height));
-    if left_size != right_size {
-        let problem = CalibrationProblem::SizeDiffers { file: right_size, pictures: left_size };
-        return Err(right.error("image_width", problem));
-    }
+    let size = pair::same_size(Place { file: right.file, field: "image_width" }, &left_camera, &right_camera)?;
     let projections = [left_projection, right_projection];
     let field = "projection_matrix";
-    let rectified = pair::rectified(right.file, [field, field], projections, left_size, warnings)?;
+    let rectified = pair::rectified(right.file, [field, field], projections, size, warnings)?;
     // Both rotations lead into the same rectified frame, where the right camera lies at (baseline, 0, 0).
     let rotation = right_rotation.transpose() * left_rotation;
     let baseline = (left_projection[3] - right_projection[3]) / left_projection[0];
