@@ -32,8 +32,8 @@ impl Node {
         // OpenCV and EuRoC begin with `%YAML:1.0`, which no YAML standard allows. The line is kept, empty, for the line
         // numbers, and so is what follows.
         let mut owned = String::with_capacity(text.len());
-        for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-            if !(index == 0 && line.starts_with('%')) {
+        for line in text.trim_start_matches('\u{feff}').lines() {
+            if !line.starts_with("%YAML") {
                 owned.push_str(line);
             }
             owned.push('\n');

@@ -78,6 +78,13 @@ pub enum CalibrationProblem {
         /// Largest deviation of `R^T R` from the identity, or the determinant's from one.
         deviation: f64,
     },
+    /// The rectification was made for another pose than the one in `R` and `T`.
+    RectificationDiffers {
+        /// What the value is.
+        value: f64,
+        /// What it would be for this pose.
+        from_pose: f64,
+    },
     /// A lens model that is not pinhole with radial-tangential distortion.
     LensModel(String),
     /// Distortion coefficients that the model does not have.
@@ -94,6 +101,13 @@ pub enum CalibrationProblem {
     },
     /// Neither the file nor the pictures say how large the pictures are.
     SizeUnknown,
+    /// The pictures of left and right camera have different sizes.
+    SizesDiffer {
+        /// Size of the left camera's pictures, px.
+        left: (u32, u32),
+        /// Size of the right camera's pictures, px.
+        right: (u32, u32),
+    },
     /// The pictures have another size.
     SizeDiffers {
         /// Size in the file, px.
@@ -205,6 +219,11 @@ impl fmt::Display for CalibrationProblem {
             Self::NotARotation { deviation } => {
                 write!(f, "is not a rotation matrix (off by {deviation:.1e}); export it with all its digits")
             }
+            Self::RectificationDiffers { value, from_pose } => write!(
+                f,
+                "has {value:.5} where R and T make it {from_pose:.5}; save R, T, R1, R2, P1 and P2 of the same calibration, \
+                 with T and P2 in metres"
+            ),
             Self::LensModel(model) => write!(
                 f,
                 "lens model `{model}` is not known; calibrate as pinhole with radial-tangential distortion (4, 5 or 8 \
@@ -223,6 +242,9 @@ impl fmt::Display for CalibrationProblem {
             Self::SizeUnknown => {
                 write!(f, "is missing, and there is no picture to take it from; add image_width and image_height")
             }
+            Self::SizesDiffer { left: (lw, lh), right: (rw, rh) } => {
+                write!(f, "is {rw} x {rh}, but {lw} x {lh} for the left camera; calibrate both at the same size")
+            }
             Self::SizeDiffers { file: (fw, fh), pictures: (pw, ph) } => write!(
                 f,
                 "is {fw} x {fh}, but the pictures are {pw} x {ph}; use the calibration made at the pictures' size"
@@ -236,7 +258,7 @@ impl fmt::Display for CalibrationWarning {
         match self {
             Self::LongBaseline { file, baseline_m } => write!(
                 f,
-                "{}: the cameras stand {baseline_m} m apart; if that is in millimetres, divide the translation by 1000 (the \
+                "{}: the cameras stand {baseline_m} m apart; if that is in millimetres, divide the translation and the fourth value of P2 by 1000 (the \
                  chessboard's squares were given in millimetres)",
                 file.display()
             ),

@@ -15,6 +15,7 @@ pub(super) fn parse(
 ) -> Result<RawPair, CalibrationError> {
     let left = camera(documents[0], pictures)?;
     let right = camera(documents[1], pictures)?;
+    pair::same_size(Place { file: documents[1].file, field: "resolution" }, &left, &right)?;
     let (left_rotation, left_origin) = pose(documents[0])?;
     let (right_rotation, right_origin) = pose(documents[1])?;
     // T_BS turns camera coordinates into body coordinates; right from left goes through the body.

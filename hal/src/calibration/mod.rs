@@ -11,7 +11,9 @@ mod document;
 mod error;
 mod euroc;
 mod kitti;
+mod opencv;
 mod pair;
+mod ros;
 
 use std::path::{Path, PathBuf};
 
@@ -24,6 +26,25 @@ use document::{Document, Node};
 /// Longest calibration file that is read, bytes: real ones have a few thousand.
 const MAX_BYTES: u64 = 1 << 20;
 
+/// The files that are looked for beside the pictures, in this order; of each set all must be there.
+const SETS: [&[&str]; 15] = [
+    &["calib.txt"],
+    &["mav0/cam0/sensor.yaml", "mav0/cam1/sensor.yaml"],
+    &["calib.yaml"],
+    &["calib.yml"],
+    &["calib.xml"],
+    &["calibration.yaml"],
+    &["calibration.yml"],
+    &["calibration.xml"],
+    &["stereo.yaml"],
+    &["stereo.yml"],
+    &["stereo.xml"],
+    &["intrinsics.yml", "extrinsics.yml"],
+    &["intrinsics.xml", "extrinsics.xml"],
+    &["left.yaml", "right.yaml"],
+    &["left.yml", "right.yml"],
+];
+
 /// Where a calibration comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CalibrationFormat {
@@ -31,6 +52,10 @@ pub enum CalibrationFormat {
     Kitti,
     /// EuRoC's `sensor.yaml` for each camera.
     Euroc,
+    /// OpenCV's FileStorage, YAML or XML.
+    OpenCv,
+    /// ROS `camera_info` for each camera.
+    Ros,
 }
 
 /// A calibration as it was read.
@@ -52,6 +77,8 @@ impl CalibrationFormat {
         match self {
             Self::Kitti => "KITTI calib.txt",
             Self::Euroc => "EuRoC sensor.yaml",
+            Self::OpenCv => "OpenCV FileStorage",
+            Self::Ros => "ROS camera_info",
         }
     }
 }
@@ -79,20 +106,38 @@ impl Calibration {
     pub fn parse(sources: &[(&Path, &str)], pictures: Option<(u32, u32)>) -> Result<Self, CalibrationError> {
         let mut warnings = Vec::new();
         let first = sources.first().map(|(file, _)| *file).unwrap_or(Path::new(""));
-        let (format, stereo) = if let [(file, text)] = sources
+        let error = |problem| Err(CalibrationError::new(first, "", problem));
+        if let [(file, text)] = sources
             && is_kitti(file, text)
         {
-            (CalibrationFormat::Kitti, StereoCalibration::Rectified(kitti::parse(file, text, pictures, &mut warnings)?))
-        } else {
-            let documents = sources.iter().map(|(file, text)| document(file, text)).collect::<Result<Vec<_>, _>>()?;
-            match documents.as_slice() {
-                [left, right] if is_euroc(left) => (
-                    CalibrationFormat::Euroc,
-                    StereoCalibration::Raw(euroc::parse([left, right], pictures, &mut warnings)?),
-                ),
-                _ => return Err(CalibrationError::new(first, "", CalibrationProblem::UnknownFormat)),
+            let stereo = StereoCalibration::Rectified(kitti::parse(file, text, pictures, &mut warnings)?);
+            return Ok(Self { stereo, format: CalibrationFormat::Kitti, files: vec![(*file).to_owned()], warnings });
+        }
+        let documents = sources.iter().map(|(file, text)| document(file, text)).collect::<Result<Vec<_>, _>>()?;
+        let (format, pair) = match documents.as_slice() {
+            [left, right] if is_euroc(left) && is_euroc(right) => {
+                (CalibrationFormat::Euroc, euroc::parse([left, right], pictures, &mut warnings)?)
+            }
+            [left, right] if ros::is_ros(left) && ros::is_ros(right) => {
+                (CalibrationFormat::Ros, ros::parse([left, right], pictures, &mut warnings)?)
+            }
+            [one] if is_euroc(one) || ros::is_ros(one) => {
+                return error(CalibrationProblem::NotAPair("is of one camera; give the files of both, left first"));
+            }
+            [_] | [_, _] if documents.iter().all(opencv::is_opencv) => {
+                (CalibrationFormat::OpenCv, opencv::parse(&documents, pictures, &mut warnings)?)
+            }
+            [left, right] if is_known(left) && is_known(right) => {
+                return error(CalibrationProblem::NotAPair(
+                    "and its partner have different formats; give files of one tool",
+                ));
+            }
+            _ => {
+                let stranger = documents.iter().find(|document| !is_known(document)).map_or(first, |d| d.file);
+                return Err(CalibrationError::new(stranger, "", CalibrationProblem::UnknownFormat));
             }
         };
+        let stereo = StereoCalibration::Raw(pair);
         Ok(Self { stereo, format, files: sources.iter().map(|(file, _)| (*file).to_owned()).collect(), warnings })
     }
 
@@ -101,10 +146,10 @@ impl Calibration {
     /// # Errors
     /// As [`Calibration::load`], and when the folder holds none.
     pub fn load_from_folder(folder: &Path, pictures: Option<(u32, u32)>) -> Result<Self, CalibrationError> {
-        const SETS: [&[&str]; 2] = [&["calib.txt"], &["mav0/cam0/sensor.yaml", "mav0/cam1/sensor.yaml"]];
         for names in SETS {
             let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
-            if paths.first().is_some_and(|path| path.exists()) {
+            // One of a set is enough to try: the error then says which other one is missing.
+            if paths.iter().any(|path| path.exists()) {
                 return Self::load(&paths, pictures);
             }
         }
@@ -146,6 +191,10 @@ fn document<'a>(file: &'a Path, text: &str) -> Result<Document<'a>, CalibrationE
     let root =
         root.map_err(|(line, message)| CalibrationError::new(file, "", CalibrationProblem::Syntax { line, message }))?;
     Ok(Document { file, root })
+}
+
+fn is_known(document: &Document<'_>) -> bool {
+    is_euroc(document) || ros::is_ros(document) || opencv::is_opencv(document)
 }
 
 fn is_euroc(document: &Document<'_>) -> bool {

@@ -9,8 +9,12 @@ use super::error::{CalibrationError, CalibrationProblem, CalibrationWarning};
 
 /// Largest deviation of a rotation matrix that rounding in a file explains.
 const ROTATION_TOLERANCE: f64 = 1.0e-3;
+/// Largest difference between a rectification and its pose that rounding in a file explains.
+const POSE_TOLERANCE: f64 = 1.0e-3;
 /// Baselines above this are not a robot's: most likely millimetres or centimetres. Metres.
 const LONG_BASELINE_M: f64 = 5.0;
+/// Baselines above this are none in any unit: 100 m in millimetres.
+const MAX_BASELINE: f64 = 1.0e5;
 /// Baselines below this cannot be told from none. Metres.
 const SHORT_BASELINE_M: f64 = 1.0e-3;
 /// Relative difference of focal lengths that is rounding.
@@ -61,6 +65,16 @@ pub(super) fn size_or_pictures(
     }
 }
 
+/// The size that both cameras have.
+pub(super) fn same_size(
+    place: Place<'_>,
+    left: &CameraModel,
+    right: &CameraModel,
+) -> Result<(u32, u32), CalibrationError> {
+    let (left, right) = ((left.width, left.height), (right.width, right.height));
+    if left == right { Ok(left) } else { Err(place.error(CalibrationProblem::SizesDiffer { left, right })) }
+}
+
 /// A camera from its matrix, row by row.
 pub(super) fn camera(
     place: Place<'_>,
@@ -68,17 +82,15 @@ pub(super) fn camera(
     (width, height): (u32, u32),
 ) -> Result<CameraModel, CalibrationError> {
     let [fx, skew, cx, _, fy, cy, ..] = k;
+    // A skew that matters is a camera matrix stored column by column, or a model that is not ours.
+    place.range(skew, -1.0e-3, 1.0e-3)?;
     Ok(CameraModel {
         width,
         height,
         fx: focal(place, fx)?,
         fy: focal(place, fy)?,
         cx: place.range(cx, -1.0e5, 1.0e5)? as f32,
-        // A skew that matters is a camera matrix stored column by column, or a model that is not ours.
-        cy: {
-            place.range(skew, -1.0e-3, 1.0e-3)?;
-            place.range(cy, -1.0e5, 1.0e5)? as f32
-        },
+        cy: place.range(cy, -1.0e5, 1.0e5)? as f32,
         distortion: Distortion::default(),
     })
 }
@@ -153,7 +165,7 @@ pub(super) fn raw(
     if baseline.x < 0.0 {
         return Err(place.error(CalibrationProblem::Exchanged { baseline_m: baseline.x }));
     }
-    warn_if_long(place, baseline.norm(), warnings);
+    check_length(place, baseline.norm(), warnings)?;
     Ok(RawPair {
         left,
         right,
@@ -225,7 +237,7 @@ pub(super) fn rectified(
     if baseline.x < SHORT_BASELINE_M {
         return Err(place.error(CalibrationProblem::NoBaseline { baseline_m: baseline.x }));
     }
-    warn_if_long(place, baseline.x, warnings);
+    check_length(place, baseline.x, warnings)?;
     Ok(RectifiedPair {
         width,
         height,
@@ -237,8 +249,45 @@ pub(super) fn rectified(
     })
 }
 
-fn warn_if_long(place: Place<'_>, baseline_m: f64, warnings: &mut Vec<CalibrationWarning>) {
-    if baseline_m > LONG_BASELINE_M {
+/// Checks that a rectification belongs to the pose: `R1 = R2 R`, and `R2 T` along the row, as long as `P2` says.
+///
+/// # Errors
+/// Of the first of `R1` and `P2` that does not.
+pub(super) fn check_rectification(
+    file: &Path,
+    [left, right]: [&Matrix3<f64>; 2],
+    (rotation, translation): (&Matrix3<f64>, &Vector3<f64>),
+    baseline_m: f64,
+) -> Result<(), CalibrationError> {
+    let from_pose = right * rotation;
+    let pairs = left.iter().zip(from_pose.iter()).map(|(value, from_pose)| ("R1", *value, *from_pose, POSE_TOLERANCE));
+    let shift = right * translation;
+    let expected = [-baseline_m, 0.0, 0.0];
+    let shifts = expected
+        .into_iter()
+        .zip(shift.iter())
+        .map(|(value, from_pose)| ("P2", -value, -from_pose, 10.0 * POSE_TOLERANCE * baseline_m.abs()));
+    match pairs.chain(shifts).find(|(_, value, from_pose, tolerance)| (value - from_pose).abs() > *tolerance) {
+        Some((field, value, from_pose, _)) => {
+            Err(Place { file, field }.error(CalibrationProblem::RectificationDiffers { value, from_pose }))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Warns of a baseline that is most likely not in metres.
+///
+/// # Errors
+/// Where it is none in any unit.
+fn check_length(
+    place: Place<'_>,
+    baseline_m: f64,
+    warnings: &mut Vec<CalibrationWarning>,
+) -> Result<(), CalibrationError> {
+    place.range(baseline_m, SHORT_BASELINE_M, MAX_BASELINE)?;
+    let said = warnings.iter().any(|warning| matches!(warning, CalibrationWarning::LongBaseline { .. }));
+    if baseline_m > LONG_BASELINE_M && !said {
         warnings.push(CalibrationWarning::LongBaseline { file: place.file.to_owned(), baseline_m });
     }
+    Ok(())
 }

@@ -176,3 +176,133 @@ fn time_ns(word: &str) -> Option<u64> {
     let nanos: u64 = format!("{fraction:0<9}").parse().ok()?;
     seconds.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos)
 }
+
+#[cfg(test)]
+mod tests {
+    use embedded_can::StandardId;
+
+    use super::*;
+    use crate::can::VirtualBus;
+
+    #[test]
+    fn what_is_sent_is_logged_and_passed_on_and_read_again() {
+        let bus = VirtualBus::new(8);
+        let (sender, mut receiver) = (bus.attach(), bus.attach());
+        let mut writer = CandumpWriter::new(Vec::new(), sender, "can0");
+        let id = StandardId::new(0x4AA).unwrap();
+        let frames = [
+            CanFrame::new(id, &[1, 2], false).unwrap(),
+            CanFrame::new(id, &[], false).unwrap(),
+            CanFrame::new(id, &[0xA5; 12], true).unwrap(),
+        ];
+        for (i, frame) in frames.iter().enumerate() {
+            writer.send(frame, 1_436_509_053_249_713_000 + i as u64 * 1_000).unwrap();
+        }
+        let (log, _) = writer.into_inner().unwrap();
+        let text = String::from_utf8(log.clone()).unwrap();
+        assert_eq!(
+            text,
+            "(1436509053.249713) can0 4AA#0102\n(1436509053.249714) can0 4AA#\n\
+             (1436509053.249715) can0 4AA##1A5A5A5A5A5A5A5A5A5A5A5A5\n"
+        );
+        let lines: Vec<CandumpLine> = parse_candump(&log).map(Result::unwrap).collect();
+        for (line, frame) in lines.iter().zip(frames) {
+            assert_eq!((line.frame, line.interface.as_str()), (frame, "can0"));
+            assert_eq!(receiver.receive().unwrap(), Some((line.timestamp_ns, frame)));
+        }
+        assert_eq!(lines.len(), 3);
+    }
+
+    #[test]
+    fn small_times_are_padded_as_candump_does() {
+        let frame = "123#".parse().unwrap();
+        let line = CandumpLine { timestamp_ns: 100_000_999, interface: "vcan0".to_owned(), frame };
+        assert_eq!(line.to_string(), "(0000000000.100000) vcan0 123#");
+    }
+
+    #[test]
+    fn windows_line_ends_comments_and_remote_frames_are_read() {
+        let log = b"# comment\r\n\r\n(1.5) can0 123#R\r\n(0000000002.000001) can1 123#11 T\r\n(3.000001)  can0  123##0";
+        let lines: Vec<CandumpLine> = parse_candump(log).map(Result::unwrap).collect();
+        let times: Vec<u64> = lines.iter().map(|line| line.timestamp_ns).collect();
+        assert_eq!(times, [1_500_000_000, 2_000_001_000, 3_000_001_000]);
+        assert!(lines[0].frame.is_remote() && !lines[1].frame.is_remote());
+        assert!(lines[2].frame.is_fd() && !lines[2].frame.bit_rate_switch());
+    }
+
+    #[test]
+    fn a_wrong_line_is_named_and_the_next_one_read() {
+        use CandumpProblem::{Frame, NotText, Time, Words};
+        for (line, problem) in [
+            (&b"can0 123#"[..], Time),
+            (b"(1) can0 123#", Time),
+            (b"(+1.0) can0 123#", Time),
+            (b"(1.0000000001) can0 123#", Time),
+            (b"(99999999999999999999.0) can0 123#", Time),
+            (b"(1.0)", Words),
+            (b"(1.0) can0", Words),
+            (b"(1.0) can0 123# X", Words),
+            (b"(1.0) can0 123", Frame(FrameParseError::NoSeparator)),
+            (b"\xff\xfe", NotText),
+            (&[b'1'; 600], NotText),
+        ] {
+            let log = [b"(0.1) can0 1AB#00\n", line, b"\n(0.2) can0 1AB#01\n"].concat();
+            let lines: Vec<_> = parse_candump(&log).collect();
+            assert_eq!(lines.len(), 3);
+            assert_eq!(lines[1], Err(CandumpError { line: 2, problem }), "{}", line.escape_ascii());
+            assert!(lines[0].is_ok() && lines[2].is_ok());
+            assert!(lines[1].as_ref().unwrap_err().to_string().starts_with("line 2: "));
+        }
+    }
+
+    #[test]
+    fn a_log_that_cannot_be_written_is_said() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::ErrorKind::StorageFull.into())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let bus = VirtualBus::new(1);
+        let mut receiver = bus.attach();
+        let mut writer = CandumpWriter::new(Full, bus.attach(), "can0");
+        let error = writer.send(&"123#".parse().unwrap(), 0).unwrap_err();
+        assert!(matches!(error, LoggedBusError::Log(_)), "{error}");
+        assert!(receiver.receive().unwrap().is_some(), "the frame was sent nevertheless");
+    }
+
+    #[test]
+    fn any_bytes_are_read_without_panic() {
+        let log = b"(1436509053.249713) can0 4AA#0102\n(0.5) can0 1F334455##1A5A5\r\n(1.0) vcan0 123#R4\n";
+        let seed = 7;
+        println!("seed {seed}");
+        let mut state: u64 = seed;
+        let mut draw = |below: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) % below) as usize
+        };
+        let (mut good, mut bad) = (0, 0);
+        for _ in 0..20_000 {
+            let mut bytes = log.to_vec();
+            for _ in 0..=draw(3) {
+                let at = draw(bytes.len() as u64);
+                bytes[at] = if draw(2) == 0 { draw(256) as u8 } else { b"#R().\n \xc3\xa90F"[draw(11)] };
+            }
+            for line in parse_candump(&bytes) {
+                match line {
+                    // What is read can be written and is the same when read again, up to the microsecond of the format.
+                    Ok(line) => {
+                        let again: CandumpLine = line.to_string().parse().unwrap();
+                        assert_eq!((again.frame, again.timestamp_ns), (line.frame, line.timestamp_ns / 1_000 * 1_000));
+                        good += 1;
+                    }
+                    Err(_) => bad += 1,
+                }
+            }
+        }
+        assert!(good > 1000 && bad > 1000, "{good} good and {bad} bad lines");
+    }
+}

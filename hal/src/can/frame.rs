@@ -231,3 +231,100 @@ fn data(text: &str) -> Result<Vec<u8>, FrameParseError> {
     });
     pairs.collect::<Option<Vec<u8>>>().ok_or(FrameParseError::Data)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn standard(id: u16) -> StandardId {
+        StandardId::new(id).unwrap()
+    }
+
+    #[test]
+    fn text_and_back_in_every_kind() {
+        // The examples of can-utils' own description of the format, and the ends of every range.
+        for text in [
+            "123#DEADBEEF",
+            "5AA#",
+            "7FF#1122334455667788",
+            "1F334455#1122334455667788",
+            "00000123#01",
+            "123##1",
+            "123##0112233",
+            "123#R",
+            "1F334455#R8",
+        ] {
+            let frame: CanFrame = text.parse().unwrap();
+            assert_eq!(frame.to_string(), text);
+        }
+        let long = format!("1FFFFFFF##1{}", "A5".repeat(64));
+        assert_eq!(long.parse::<CanFrame>().unwrap().to_string(), long);
+        let dotted: CanFrame = "123#de.ad.be.ef".parse().unwrap();
+        assert_eq!(dotted.to_string(), "123#DEADBEEF");
+    }
+
+    #[test]
+    fn text_that_is_no_frame_is_refused() {
+        use FrameParseError::{Data, Flags, Identifier, Length, NoSeparator};
+        for (text, error) in [
+            ("", NoSeparator),
+            ("123", NoSeparator),
+            ("#11", Identifier),
+            ("800#11", Identifier),
+            ("+12#11", Identifier),
+            ("12#11", Identifier),
+            ("2FFFFFFF#11", Identifier),
+            ("123#1", Data),
+            ("123#+1", Data),
+            ("123#0G", Data),
+            ("123#é", Data),
+            ("123#112233445566778899", Length(9)),
+            ("123##1112233445566778899", Length(9)),
+            ("123##", Flags),
+            ("123##G", Flags),
+            ("123#R9", Length(9)),
+            ("123#RG", Data),
+        ] {
+            assert_eq!(text.parse::<CanFrame>(), Err(error), "{text}");
+        }
+        assert_eq!(format!("123##1{}", "00".repeat(65)).parse::<CanFrame>(), Err(Length(65)));
+    }
+
+    #[test]
+    fn only_lengths_that_the_standard_has_make_a_frame() {
+        let classic: Vec<usize> =
+            (0..=70).filter(|n| CanFrame::new(standard(1), &vec![0; *n], false).is_some()).collect();
+        assert_eq!(classic, (0..=8).collect::<Vec<_>>());
+        let fd: Vec<usize> = (0..=70).filter(|n| CanFrame::new(standard(1), &vec![0; *n], true).is_some()).collect();
+        assert_eq!(fd, [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64]);
+    }
+
+    #[test]
+    fn arbitration_follows_the_bits_on_the_wire() {
+        let extended = |id| CanFrame::new(ExtendedId::new(id).unwrap(), &[], false).unwrap();
+        let in_order = [
+            CanFrame::new(standard(0), &[], false).unwrap(),
+            CanFrame::new(standard(0x123), &[], false).unwrap(),
+            <CanFrame as Frame>::new_remote(standard(0x123), 0).unwrap(),
+            extended(0x123 << 18),
+            extended(0x123 << 18 | 1),
+            CanFrame::new(standard(0x124), &[], false).unwrap(),
+            CanFrame::new(standard(0x7FF), &[], false).unwrap(),
+            extended(0x1FFF_FFFF),
+        ];
+        assert!(in_order.iter().map(CanFrame::arbitration_key).is_sorted_by(|a, b| a < b));
+    }
+
+    #[test]
+    fn the_common_trait_sees_a_classic_frame() {
+        fn look<F: Frame>(frame: &F) -> (bool, bool, usize, Vec<u8>) {
+            (frame.is_extended(), frame.is_remote_frame(), frame.dlc(), frame.data().to_vec())
+        }
+        let frame = <CanFrame as Frame>::new(standard(1), &[1, 2]).unwrap();
+        assert_eq!(look(&frame), (false, false, 2, vec![1, 2]));
+        let remote = <CanFrame as Frame>::new_remote(ExtendedId::new(1).unwrap(), 5).unwrap();
+        assert_eq!(look(&remote), (true, true, 5, vec![]));
+        assert!(<CanFrame as Frame>::new(standard(1), &[0; 9]).is_none());
+        assert!(<CanFrame as Frame>::new_remote(standard(1), 9).is_none());
+    }
+}

@@ -5,10 +5,14 @@
 //! ```
 
 mod candump;
+mod fault;
 mod frame;
+mod virtual_bus;
 
 pub use candump::{CandumpError, CandumpLine, CandumpProblem, CandumpWriter, LoggedBusError, parse_candump};
+pub use fault::{FaultCounts, FaultInjector};
 pub use frame::{CanFrame, FrameParseError};
+pub use virtual_bus::{VirtualBus, VirtualNode};
 
 /// A place on a CAN bus from which frames are sent and where the others' frames arrive.
 pub trait CanBus {

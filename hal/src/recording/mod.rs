@@ -14,6 +14,7 @@ mod euroc;
 mod kitti;
 mod mount;
 mod picture;
+mod writer;
 
 use std::path::{Path, PathBuf};
 
@@ -22,6 +23,7 @@ use fencepost_core::geometry::{Mount, StereoCalibration};
 pub use camera::RecordedCamera;
 pub use error::{RecordingError, RecordingWarning};
 pub use picture::GreyPicture;
+pub use writer::RecordingWriter;
 
 use crate::calibration::Calibration;
 

@@ -33,7 +33,7 @@ pub(super) struct Converted {
 pub(super) fn decode(frame: u32, path: &Path) -> Result<(GreyPicture, Converted), RecordingError> {
     let bytes = read(frame, path)?;
     let bad = |reason: String| RecordingError::BadPicture { frame, path: path.to_owned(), reason };
-    let decoded = reader(&bytes).and_then(|reader| Ok(reader.decode()?)).map_err(|e| bad(e.to_string()))?;
+    let decoded = reader(&bytes).and_then(ImageReader::decode).map_err(|e| bad(e.to_string()))?;
     let (width, height) = (decoded.width(), decoded.height());
     let colour = decoded.color().has_color();
     let sixteen_bit = !matches!(decoded.color(), ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8);
@@ -50,7 +50,7 @@ pub(super) fn decode(frame: u32, path: &Path) -> Result<(GreyPicture, Converted)
 /// Width and height of the picture at `path`, from its header alone.
 pub(super) fn size(frame: u32, path: &Path) -> Result<(u32, u32), RecordingError> {
     let bytes = read(frame, path)?;
-    let size = reader(&bytes).and_then(|reader| Ok(reader.into_dimensions()?));
+    let size = reader(&bytes).and_then(ImageReader::into_dimensions);
     size.map_err(|e| RecordingError::BadPicture { frame, path: path.to_owned(), reason: e.to_string() })
 }
 
