@@ -134,7 +134,7 @@ pub(crate) mod testing {
                     _ if y > 40 => (SurfaceClass::Ground, [0.1, 0.0, 0.99]),
                     _ => return None,
                 };
-                Some(Surface { class, normal, pixels: 400, ..Surface::default() })
+                Some(Surface { class, normal, ..Surface::default() })
             };
             look(&FrameView {
                 number: 7,
