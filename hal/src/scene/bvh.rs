@@ -1,6 +1,6 @@
 //! Triangles and leaves in a tree of boxes, so that a ray meets few of them.
 
-use super::vector::{V3, v3};
+use super::vector::{V3, least, most, v3};
 
 /// A triangle, or a parallelogram: the points `corner + u side_a + v side_b` with `u, v >= 0` and `u + v <= 1`, or both `<= 1`.
 #[derive(Clone, Copy, Debug)]
@@ -227,8 +227,8 @@ fn entry(node: &Node, origin: V3, inverse: V3, near: f32, far: f32) -> Option<f3
     let a = (node.low - origin).scaled(inverse);
     let b = (node.high - origin).scaled(inverse);
     let (low, high) = (a.min(b), a.max(b));
-    let enter = low.x.max(low.y).max(low.z.max(near));
-    let leave = high.x.min(high.y).min(high.z.min(far));
+    let enter = most(most(low.x, low.y), most(low.z, near));
+    let leave = least(least(high.x, high.y), least(high.z, far));
     (enter <= leave * 1.000_001).then_some(enter)
 }
 

@@ -15,7 +15,7 @@ pub(crate) struct Planter<'a> {
 
 pub(crate) fn furnish(options: &SceneOptions, ground: &Ground) -> Mesh {
     let mut planter = Planter::new(ground, options.seed);
-    planter.grass(if options.content == Content::Rural { 1500 } else { 900 });
+    planter.grass(if options.content == Content::Rural { 2600 } else { 2600 });
     planter.pebbles(90);
     if options.content == Content::Rural {
         planter.rural();
@@ -118,8 +118,8 @@ impl<'a> Planter<'a> {
             let end = spot + lean + v3(c * reach, s * reach, rise);
             self.mesh.limb(fork - V3::UP * rng.range(0.0, 0.3), end, (radius_m * 0.4, 0.02), 0.1, Material::Bark, rng);
             let size = height_m * rng.range(0.13, 0.17);
-            let leaves = if near { 30 } else { 16 };
-            self.mesh.foliage(end, v3(1.15, 1.15, 0.85) * size, 26, leaves, leaf, rng);
+            let leaves = if near { 36 } else { 18 };
+            self.mesh.foliage(end, v3(1.15, 1.15, 0.85) * size, 34, leaves, leaf, rng);
         }
     }
 

@@ -46,8 +46,8 @@ pub(crate) fn ground(p: V3, trail: Trail, footprint_m: f32, seed: u32) -> Finish
         let m = STALK.plane(p.x, p.y, footprint_m);
         let dry = smoothstep(-0.2, 0.9, noise2(p.x * 0.45, p.y * 0.45, seed ^ 9).value + 0.35 * n.value);
         let base = mix(0.135, 0.23, dry);
-        finish.albedo += grass * (base * (1.0 + 0.3 * n.value + 0.33 * m.value)).max(0.02);
-        finish.bump += v3(-n.dx - m.dx, -n.dy - m.dy, 0.0) * (0.006 * grass);
+        finish.albedo += grass * (base * (1.0 + 0.4 * n.value + 0.5 * m.value)).max(0.02);
+        finish.bump += v3(-n.dx - m.dx, -n.dy - m.dy, 0.0) * (0.008 * grass);
     }
     finish
 }
@@ -115,7 +115,7 @@ pub(crate) fn thing(material: Material, p: V3, normal: V3, grain: V3, above_m: f
             let (streak, _) = super::noise::noise3(v3(p.x * 6.0, p.y * 6.0, p.z * 0.7), 0x57e4);
             let (patch, _) = super::noise::noise3(p * 2.1, 0x9a7c);
             let splash = smoothstep(0.5, 0.05, above_m + 0.22 * patch + 0.1 * n);
-            let bare = smoothstep(0.52, 0.6, patch + 0.16 * n);
+            let bare = smoothstep(0.5, 0.62, patch + 0.3 * n);
             let clean = 0.5 * (1.0 + 0.05 * n + 0.05 * streak);
             finish.albedo = mix(mix(clean, 0.33 * (1.0 + 0.3 * n), 0.8 * bare), 0.24 * (1.0 + 0.35 * n), 0.75 * splash);
             finish.bump = g * (-0.0015 - 0.004 * bare);

@@ -152,13 +152,13 @@ impl Mesh {
         let seed = rng.bits();
         let body_tint = rng.range(0.85, 1.2);
         self.ball(10, Material::Leaf, 0.45, |d| {
-            centre + d.scaled(radii) * (0.72 + 0.16 * noise3(d * 2.6, seed).0)
+            centre + d.scaled(radii) * (0.6 + 0.16 * noise3(d * 2.6, seed).0)
         });
         let mean = (radii.x + radii.y + radii.z) / 3.0;
         let clump_m = (mean * 1.9 / (clumps as f32).sqrt()).max(leaf_m);
         for _ in 0..clumps {
             let d = rng.direction();
-            let middle = centre + d.scaled(radii) * (rng.range(0.72, 0.98) + 0.12 * noise3(d * 2.6, seed).0);
+            let middle = centre + d.scaled(radii) * (rng.range(0.6, 0.98) + 0.12 * noise3(d * 2.6, seed).0);
             let tint = body_tint * rng.range(0.78, 1.2);
             for _ in 0..leaves {
                 let mut out = rng.direction();

@@ -45,7 +45,7 @@ impl Scene {
         let mut light = vec![0.0f32; width * height];
         for_each_chunk(&mut light, width, |y, row| {
             for (x, pixel) in row.iter_mut().enumerate() {
-                *pixel = RAYS.iter().map(|(dx, dy)| self.light_along(eye, eye.look(x as f32 + dx, y as f32 + dy))).sum::<f32>() * 0.25;
+                *pixel = self.pixel(eye, x as f32, y as f32);
             }
         });
         let seed = hash(self.options.seed ^ hash(frame.wrapping_mul(2).wrapping_add(side)));
@@ -53,6 +53,18 @@ impl Scene {
         let mut grey = vec![0; width * height];
         sensor.expose(&light, &mut grey);
         grey
+    }
+
+    fn pixel(&self, eye: &Eye, x: f32, y: f32) -> f32 {
+        let [a, b, c, d] = RAYS.map(|(dx, dy)| eye.look(x + dx, y + dy));
+        let (hit_a, hit_c) = (self.meet(eye.origin, a), self.meet(eye.origin, c));
+        let pair = self.light_along(eye, a, hit_a) + self.light_along(eye, c, hit_c);
+        // Two rays do where there is no edge between them.
+        if matches!((hit_a, hit_c), (Hit::Ground(_), Hit::Ground(_)) | (Hit::Far, Hit::Far)) {
+            return 0.5 * pair;
+        }
+        let (hit_b, hit_d) = (self.meet(eye.origin, b), self.meet(eye.origin, d));
+        0.25 * (pair + self.light_along(eye, b, hit_b) + self.light_along(eye, d, hit_d))
     }
 
     /// Follows a ray. `direction` is 1 long along the optical axis, so that the distances are depths.
@@ -66,9 +78,9 @@ impl Scene {
         }
     }
 
-    fn light_along(&self, eye: &Eye, direction: V3) -> f32 {
+    fn light_along(&self, eye: &Eye, direction: V3, hit: Hit) -> f32 {
         let pixel_rad = 0.5 / eye.focal_px();
-        match self.meet(eye.origin, direction) {
+        match hit {
             Hit::Far => sky::far(eye.origin, direction, pixel_rad, self.options.seed).0,
             Hit::Ground(t) => hazy(self.ground_light(eye.origin + direction * t, direction, t * pixel_rad), t),
             Hit::Thing(hit) => {

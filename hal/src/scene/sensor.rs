@@ -17,7 +17,7 @@ pub(crate) struct Sensor {
 }
 
 /// Light of a surface that comes out at about half of the range.
-const EXPOSURE: f32 = 1.7;
+const EXPOSURE: f32 = 1.75;
 /// Weights of the blur of a good lens, about 0.5 px.
 const BLUR: [f32; 3] = [0.12, 0.76, 0.12];
 
@@ -42,8 +42,9 @@ impl Sensor {
         let (dx, dy) = ((x as f32 / self.width as f32 - 0.5) * 2.0, (y as f32 / self.height as f32 - 0.5) * 2.0);
         let corner = 1.0 - 0.1 * (dx * dx + dy * dy);
         let exposed = (light * EXPOSURE * self.exposure * corner).max(0.0);
-        // Highlights are rolled off, then the usual square-root coding.
-        let coded = (exposed * (1.0 + exposed * 0.12) / (1.0 + exposed)).min(1.0).sqrt();
+        // The usual square-root coding, with a deeper foot and a shoulder, as cameras draw it.
+        let root = exposed.sqrt();
+        let coded = root * root * (1.35 + 0.4 * root) / (0.55 + root * root);
         let value = 255.0 * coded;
         // Under square-root coding the noise of the light is the same at every brightness.
         let sigma = self.noise_sigma * 1.25;
