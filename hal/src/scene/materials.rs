@@ -45,7 +45,7 @@ pub(crate) fn ground(p: V3, trail: Trail, footprint_m: f32, seed: u32) -> Finish
         let n = GRASS.plane(p.x, p.y, footprint_m);
         let m = STALK.plane(p.x, p.y, footprint_m);
         let dry = smoothstep(-0.2, 0.9, noise2(p.x * 0.45, p.y * 0.45, seed ^ 9).value + 0.35 * n.value);
-        let base = mix(0.135, 0.23, dry);
+        let base = mix(0.13, 0.195, dry);
         finish.albedo += grass * (base * (1.0 + 0.4 * n.value + 0.5 * m.value)).max(0.02);
         finish.bump += v3(-n.dx - m.dx, -n.dy - m.dy, 0.0) * (0.008 * grass);
     }
@@ -100,7 +100,7 @@ pub(crate) fn thing(material: Material, p: V3, normal: V3, grain: V3, above_m: f
         Material::Bark => {
             let (n, g) = BARK.space(drawn(0.22), footprint_m);
             let crack = smoothstep(-0.1, -0.7, n);
-            finish.albedo = (0.19 * (1.0 + 0.5 * n)).max(0.03) * (1.0 - 0.6 * crack);
+            finish.albedo = (0.22 * (1.0 + 0.6 * n)).max(0.03) * (1.0 - 0.65 * crack);
             finish.bump = g * -0.011;
         }
         Material::Wood => {
@@ -127,8 +127,8 @@ pub(crate) fn thing(material: Material, p: V3, normal: V3, grain: V3, above_m: f
         }
         Material::Leaf => {
             let (n, _) = LEAF.space(p, footprint_m);
-            finish.albedo = (0.17 * (1.0 + 0.3 * n)).max(0.02);
-            finish.through = 0.45;
+            finish.albedo = (0.2 * (1.0 + 0.35 * n)).max(0.02);
+            finish.through = 0.5;
         }
         Material::Blade => {
             finish.albedo = 0.26 * smoothstep(-0.05, 0.09, above_m);

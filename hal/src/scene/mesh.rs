@@ -151,7 +151,7 @@ impl Mesh {
     pub(crate) fn foliage(&mut self, centre: V3, radii: V3, clumps: usize, leaves: usize, leaf_m: f32, rng: &mut Rng) {
         let seed = rng.bits();
         let body_tint = rng.range(0.85, 1.2);
-        self.ball(10, Material::Leaf, 0.45, |d| {
+        self.ball(10, Material::Leaf, 0.55, |d| {
             centre + d.scaled(radii) * (0.6 + 0.16 * noise3(d * 2.6, seed).0)
         });
         let mean = (radii.x + radii.y + radii.z) / 3.0;

@@ -5,7 +5,7 @@ use super::vector::{V3, mix, smoothstep};
 
 const CLOUD: Fractal = Fractal { wave_m: 2.6, octaves: 6, gain: 0.52, seed: 0xc10d };
 const RIDGE: Fractal = Fractal { wave_m: 0.5, octaves: 6, gain: 0.5, seed: 0x41d6 };
-const WOODS: Fractal = Fractal { wave_m: 0.03, octaves: 5, gain: 0.7, seed: 0x300d };
+const WOODS: Fractal = Fractal { wave_m: 0.014, octaves: 4, gain: 0.75, seed: 0x300d };
 
 /// Distance, height and darkness of the ridges, nearest first. They stand around the origin of the world.
 const RIDGES: [Ridge; 3] = [
