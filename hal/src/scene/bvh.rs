@@ -113,7 +113,6 @@ impl Bvh {
         bvh
     }
 
-
     fn build(&mut self, items: &mut [Item], first: u32, depth: usize) {
         let (mut low, mut high) = (items[0].low, items[0].high);
         let (mut centre_low, mut centre_high) = (items[0].centre, items[0].centre);

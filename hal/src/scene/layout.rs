@@ -92,7 +92,8 @@ impl<'a> Planter<'a> {
         self.mesh.begin(V3::UP, true);
         let leaf = (0.055 + 0.0025 * x).min(0.16);
         for _ in 0..3 {
-            let shift = v3(self.rng.range(-0.5, 0.5), self.rng.range(-0.5, 0.5), self.rng.range(-0.12, 0.15)) * radius_m;
+            let shift =
+                v3(self.rng.range(-0.5, 0.5), self.rng.range(-0.5, 0.5), self.rng.range(-0.12, 0.15)) * radius_m;
             let radii = v3(0.8, 0.8, 0.72) * (radius_m * self.rng.range(0.75, 1.0));
             let centre = spot + shift + V3::UP * (0.55 * radius_m);
             self.mesh.foliage(centre, radii, 40, 24, leaf, &mut self.rng);
@@ -106,7 +107,14 @@ impl<'a> Planter<'a> {
         let lean = v3(self.rng.range(-0.25, 0.25), self.rng.range(-0.25, 0.25), 0.0);
         let fork = spot + V3::UP * (0.5 * height_m) + lean;
         let rng = &mut self.rng;
-        self.mesh.limb(spot - V3::UP * 0.15, spot + V3::UP * 0.35, (radius_m * 1.5, radius_m), 0.22, Material::Bark, rng);
+        self.mesh.limb(
+            spot - V3::UP * 0.15,
+            spot + V3::UP * 0.35,
+            (radius_m * 1.5, radius_m),
+            0.22,
+            Material::Bark,
+            rng,
+        );
         self.mesh.limb(spot + V3::UP * 0.25, fork, (radius_m * 1.03, radius_m * 0.6), 0.12, Material::Bark, rng);
         let leaf = if near { 0.1 } else { 0.2 };
         let crowns = if near { 10 } else { 6 };

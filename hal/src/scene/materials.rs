@@ -28,7 +28,8 @@ const LEAF: Fractal = Fractal { wave_m: 0.06, octaves: 3, gain: 0.7, seed: 0x1ea
 /// The ground at a point, seen by a pixel that covers `footprint_m` of it.
 pub(crate) fn ground(p: V3, trail: Trail, footprint_m: f32, seed: u32) -> Finish {
     let aside = (p.y - trail.y(p.x)).abs();
-    let ragged = 0.2 * noise2(p.x * 0.9, p.y * 0.9, seed ^ 3).value + 0.14 * noise2(p.x * 4.3, p.y * 4.3, seed ^ 5).value
+    let ragged = 0.2 * noise2(p.x * 0.9, p.y * 0.9, seed ^ 3).value
+        + 0.14 * noise2(p.x * 4.3, p.y * 4.3, seed ^ 5).value
         + 0.07 * noise2(p.x * 17.0, p.y * 17.0, seed ^ 6).value;
     let edge = smoothstep(1.2, 0.95, aside + ragged);
     let middle = 0.8 * smoothstep(0.36, 0.16, aside + 0.8 * ragged);

@@ -137,11 +137,7 @@ impl SceneOptions {
 
     /// How the left camera sits on the vehicle.
     pub fn mount(&self) -> Mount {
-        Mount {
-            height_m: Some(self.mount_height_m),
-            pitch_down_deg: self.pitch_down_deg,
-            roll_deg: self.roll_deg,
-        }
+        Mount { height_m: Some(self.mount_height_m), pitch_down_deg: self.pitch_down_deg, roll_deg: self.roll_deg }
     }
 
     /// The exact calibration. With distortion or misalignment the pair is raw, and its rectified cameras are those of

@@ -37,7 +37,10 @@ impl Scene {
     /// Eight rays a pixel.
     pub fn render(&self, frame: u32) -> RenderedPair {
         let [left, right] = self.eyes(frame);
-        RenderedPair { left: self.photograph(&left, frame, 0, 1.0), right: self.photograph(&right, frame, 1, self.options.exposure_ratio) }
+        RenderedPair {
+            left: self.photograph(&left, frame, 0, 1.0),
+            right: self.photograph(&right, frame, 1, self.options.exposure_ratio),
+        }
     }
 
     fn photograph(&self, eye: &Eye, frame: u32, side: u32, exposure: f32) -> Vec<u8> {

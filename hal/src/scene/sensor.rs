@@ -27,7 +27,8 @@ impl Sensor {
         let (w, h) = (self.width, self.height);
         for_each_chunk(grey, w, |y, row| {
             let (above, below) = (y.saturating_sub(1), (y + 1).min(h - 1));
-            let column = |x: usize| BLUR[0] * light[above * w + x] + BLUR[1] * light[y * w + x] + BLUR[2] * light[below * w + x];
+            let column =
+                |x: usize| BLUR[0] * light[above * w + x] + BLUR[1] * light[y * w + x] + BLUR[2] * light[below * w + x];
             let (mut left, mut middle) = (column(0), column(0));
             for (x, pixel) in row.iter_mut().enumerate() {
                 let right = column((x + 1).min(w - 1));

@@ -130,7 +130,8 @@ impl Scene {
         let (px, py, depth_m) = eye.project(p);
         let look = eye.look(px, py);
         let reach = depth_m - 0.004 - 0.002 * depth_m;
-        self.bvh.blocks(eye.origin, look, 0.05, reach) || self.ground.meet(eye.origin, look).is_some_and(|t| t < reach - 0.03)
+        self.bvh.blocks(eye.origin, look, 0.05, reach)
+            || self.ground.meet(eye.origin, look).is_some_and(|t| t < reach - 0.03)
     }
 
     fn cell(&self, x: f32, y: f32) -> Option<usize> {
@@ -158,8 +159,7 @@ impl Scene {
             }
         }
         let farthest_m = self.options.focal_px * self.options.baseline_m / LEAST_DISPARITY_PX;
-        let mut cells =
-            TruthCells { geometry, cells: Vec::new(), nearest_m: NEAREST_M, farthest_m, aside_m: ASIDE_M };
+        let mut cells = TruthCells { geometry, cells: Vec::new(), nearest_m: NEAREST_M, farthest_m, aside_m: ASIDE_M };
         cells.cells = (0..)
             .zip(&tallies)
             .map(|(index, tally)| {
