@@ -17,7 +17,7 @@ pub(crate) struct Planter<'a> {
 
 pub(crate) fn furnish(options: &SceneOptions, ground: &Ground) -> Mesh {
     let mut planter = Planter::new(ground, options.seed);
-    planter.grass(2600);
+    planter.grass(2200);
     planter.pebbles(90);
     if options.content == Content::Rural {
         planter.rural();
@@ -79,7 +79,7 @@ impl<'a> Planter<'a> {
     fn pebbles(&mut self, count: usize) {
         for _ in 0..count {
             let (x, s) = (self.rng.range(0.8, 14.0), self.rng.range(-1.5, 1.5));
-            let size = self.rng.range(0.008, 0.03) + if self.rng.bits() % 7 == 0 { 0.03 } else { 0.0 };
+            let size = self.rng.range(0.008, 0.03) + if self.rng.bits().is_multiple_of(7) { 0.03 } else { 0.0 };
             let radii = v3(self.rng.range(0.9, 1.5), self.rng.range(0.9, 1.5), 0.75) * size;
             let centre = self.spot(x, s) + V3::UP * (0.25 * size);
             self.mesh.begin(V3::UP, size > 0.03);

@@ -23,6 +23,9 @@ pub(crate) enum Hit {
 /// Four rays a pixel, on a turned square: near-vertical and near-level edges get four shades each.
 const RAYS: [(f32, f32); 4] = [(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)];
 
+/// Size in pixels of the finest texture of a pixel that is looked at once.
+const COARSE: f32 = 0.62;
+
 const SUN: f32 = 1.05;
 const SKY: f32 = 0.36;
 /// Light that the ground gives back to what stands on it.
@@ -61,13 +64,30 @@ impl Scene {
     fn pixel(&self, eye: &Eye, x: f32, y: f32) -> f32 {
         let [a, b, c, d] = RAYS.map(|(dx, dy)| eye.look(x + dx, y + dy));
         let (hit_a, hit_c) = (self.meet(eye.origin, a), self.meet(eye.origin, c));
-        let pair = self.light_along(eye, a, hit_a) + self.light_along(eye, c, hit_c);
-        // Two rays do where there is no edge between them.
-        if matches!((hit_a, hit_c), (Hit::Ground(_), Hit::Ground(_)) | (Hit::Far, Hit::Far)) {
-            return 0.5 * pair;
+        let light = |a, hit_a, c, hit_c| self.light_along(eye, a, hit_a) + self.light_along(eye, c, hit_c);
+        // Two rays do where there is no edge between them, and on the ground one look at what they meet.
+        match (hit_a, hit_c) {
+            (Hit::Ground(ta), Hit::Ground(tc)) if (ta - tc).abs() < 0.1 * ta => {
+                let t = 0.5 * (ta + tc);
+                let p = (a * ta + c * tc) * 0.5;
+                let light = self.ground_light(eye.origin + p, p, t * COARSE / eye.focal_px());
+                return hazy(light, t);
+            }
+            (Hit::Ground(_), Hit::Ground(_)) | (Hit::Far, Hit::Far) => return 0.5 * light(a, hit_a, c, hit_c),
+            (Hit::Thing(one), Hit::Thing(other)) if self.is_one_face(&one, &other) => {
+                return 0.5 * light(a, hit_a, c, hit_c);
+            }
+            _ => {}
         }
         let (hit_b, hit_d) = (self.meet(eye.origin, b), self.meet(eye.origin, d));
-        0.25 * (pair + self.light_along(eye, b, hit_b) + self.light_along(eye, d, hit_d))
+        0.25 * (light(a, hit_a, c, hit_c) + light(b, hit_b, d, hit_d))
+    }
+
+    /// Whether two neighbouring rays meet the same smooth surface, so that there is nothing to be seen between them.
+    fn is_one_face(&self, one: &ShapeHit, other: &ShapeHit) -> bool {
+        let (a, b) = (&self.skins[one.id as usize], &self.skins[other.id as usize]);
+        let leafy = matches!(a.material, Material::Leaf | Material::Blade);
+        !leafy && a.object == b.object && a.material == b.material && (one.t - other.t).abs() < 0.02 * one.t
     }
 
     /// Follows a ray. `direction` is 1 long along the optical axis, so that the distances are depths.

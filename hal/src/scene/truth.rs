@@ -118,7 +118,7 @@ impl Scene {
         let disparity = (disparity_px * 256.0 + 0.5).clamp(0.0, 65535.0) as u16;
         let p = left.origin + look * depth_m;
         let hidden = x - disparity_px < 0.0 || self.hides(right, p);
-        let v = pose.from_world(p);
+        let v = pose.to_vehicle(p);
         let above_m = p.z - self.ground.height(p.x, p.y);
         let place = self.cell(v.x, v.y).map(|index| (index, above_m, thing));
         // Cells are judged by what both cameras see.
@@ -153,7 +153,7 @@ impl Scene {
         }
         for (i, j) in &self.high {
             let (x, y) = ((f32::from(*i) + 0.5) * MARK_M, (f32::from(*j) + 0.5) * MARK_M);
-            let v = pose.from_world(v3(x, y, self.ground.height(x, y)));
+            let v = pose.to_vehicle(v3(x, y, self.ground.height(x, y)));
             if let Some(index) = self.cell(v.x, v.y) {
                 tallies[index].high = true;
             }
