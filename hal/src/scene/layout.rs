@@ -127,7 +127,7 @@ impl<'a> Planter<'a> {
             let end = spot + lean + v3(c * reach, s * reach, rise);
             self.mesh.limb(fork - V3::UP * rng.range(0.0, 0.3), end, (radius_m * 0.4, 0.02), 0.1, Material::Bark, rng);
             let size = height_m * rng.range(0.09, 0.16);
-            let leaves = if near { 30 } else { 18 };
+            let leaves = if near { 38 } else { 18 };
             self.mesh.foliage(end, v3(1.15, 1.15, 0.85) * size, 30, leaves, leaf, rng);
         }
     }

@@ -23,6 +23,7 @@ const ROCK: Fractal = Fractal { wave_m: 0.5, octaves: 8, gain: 0.68, seed: 0x0c4
 const BARK: Fractal = Fractal { wave_m: 0.16, octaves: 6, gain: 0.72, seed: 0xba4c };
 const WOOD: Fractal = Fractal { wave_m: 0.09, octaves: 6, gain: 0.7, seed: 0x300d };
 const PLASTER: Fractal = Fractal { wave_m: 1.1, octaves: 9, gain: 0.66, seed: 0x91a5 };
+const THICKET: Fractal = Fractal { wave_m: 0.21, octaves: 5, gain: 0.85, seed: 0x741c };
 const LEAF: Fractal = Fractal { wave_m: 0.06, octaves: 3, gain: 0.7, seed: 0x1eaf };
 
 /// The ground at a point, seen by a pixel that covers `footprint_m` of it.
@@ -130,6 +131,12 @@ pub(crate) fn thing(material: Material, p: V3, normal: V3, grain: V3, above_m: f
             let (n, _) = LEAF.space(p, footprint_m);
             finish.albedo = (0.2 * (1.0 + 0.35 * n)).max(0.02);
             finish.through = 0.5;
+        }
+        Material::Thicket => {
+            let (n, g) = THICKET.space(p, footprint_m);
+            finish.albedo = (0.36 * smoothstep(-0.9, 1.4, n)).max(0.02);
+            finish.bump = g * -0.03;
+            finish.through = 0.3;
         }
         Material::Blade => {
             finish.albedo = 0.26 * smoothstep(-0.05, 0.09, above_m);

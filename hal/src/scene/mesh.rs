@@ -10,6 +10,8 @@ pub(crate) enum Material {
     Rock,
     Bark,
     Leaf,
+    /// The inside of a leafy body: leaves upon leaves.
+    Thicket,
     Blade,
     Wood,
     Plaster,
@@ -153,7 +155,9 @@ impl Mesh {
     pub(crate) fn foliage(&mut self, centre: V3, radii: V3, clumps: usize, leaves: usize, leaf_m: f32, rng: &mut Rng) {
         let seed = rng.bits();
         let body_tint = rng.range(0.85, 1.2);
-        self.ball(10, Material::Leaf, 0.55, |d| centre + d.scaled(radii) * (0.6 + 0.16 * noise3(d * 2.6, seed).0));
+        self.ball(12, Material::Thicket, 0.8, |d| {
+            centre + d.scaled(radii) * (0.6 + 0.16 * noise3(d * 2.6, seed).0 + 0.07 * noise3(d * 6.3, seed).0)
+        });
         let mean = (radii.x + radii.y + radii.z) / 3.0;
         let clump_m = (mean * 1.9 / (clumps as f32).sqrt()).max(leaf_m);
         for _ in 0..clumps {
