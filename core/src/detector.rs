@@ -198,6 +198,8 @@ impl<
         self.setup = None;
         let frame = VehicleFrame::new(mount)?;
         let pair = self.rectifier.configure(calibration)?;
+        // The mount speaks of the left camera as it is; disparities are seen by the rectified one.
+        let frame = self.rectifier.rotation(Side::Left).map_or(frame, |rotation| frame.turned(rotation));
         let (width, height) = (pair.width as usize, pair.height as usize);
         self.surfaces.configure(&settings.surfaces, width, height)?;
         self.matcher.configure(&settings.matching, width, height)?;

@@ -66,6 +66,14 @@ impl VehicleFrame {
         Ok(Self { rows, height_m: mount.height_m.unwrap_or(Mount::ASSUMED_HEIGHT_M) })
     }
 
+    /// The frame for a camera that was turned against the one that the mount speaks of: `rotation` takes directions of the
+    /// mounted camera into the turned one, row by row. Rectification turns the left camera in this way.
+    #[must_use]
+    pub fn turned(&self, rotation: &[[f32; 3]; 3]) -> Self {
+        let rows = self.rows.map(|axis| core::array::from_fn(|i| dot(rotation[i], axis)));
+        Self { rows, ..*self }
+    }
+
     /// Height of the camera above the origin of the vehicle frame, metres.
     pub const fn camera_height_m(&self) -> f32 {
         self.height_m

@@ -80,7 +80,7 @@ impl GroundFinder {
         self.last = plane;
         if let Some(plane) = plane {
             for surface in surfaces.table_mut() {
-                if surface.class == SurfaceClass::Horizontal && self.lies_on(&plane, surface, 1.0) {
+                if surface.class == SurfaceClass::Horizontal && self.lies_on(&plane, surface) {
                     surface.class = SurfaceClass::Ground;
                 }
             }
@@ -143,9 +143,9 @@ impl GroundFinder {
         let mut weight = 0.0;
         for round in 0..REFINEMENTS {
             // A first plane may be bent by what is not ground, or come from an earlier frame: it is forgiven more.
-            let slack = if round == 0 { 2.5 } else { 1.0 };
-            let on_it =
-                table.iter().filter(|surface| self.may_be_ground(surface) && self.lies_on(&plane, surface, slack));
+            let tolerance = self.settings.fit_tolerance_m * if round == 0 { 2.5 } else { 1.0 };
+            let near = |surface: &Surface| plane.height_m(surface.points.mean_m).abs() <= tolerance;
+            let on_it = table.iter().filter(|surface| self.may_be_ground(surface) && near(surface));
             let mut support = 0;
             let mut points = Scatter::default();
             for surface in on_it {
@@ -168,11 +168,11 @@ impl GroundFinder {
         Scatter { weight, ..surface.points }
     }
 
-    fn lies_on(&self, plane: &GroundPlane, surface: &Surface, slack: f32) -> bool {
+    fn lies_on(&self, plane: &GroundPlane, surface: &Surface) -> bool {
         let [x, y, _] = surface.points.mean_m;
         let range = libm::sqrtf(x * x + y * y);
         let tolerance = self.settings.surface_tolerance_m + self.settings.surface_tolerance_per_m * range;
-        plane.height_m(surface.points.mean_m).abs() <= slack * tolerance
+        plane.height_m(surface.points.mean_m).abs() <= tolerance
     }
 
     fn plausible(&self, plane: &GroundPlane) -> bool {

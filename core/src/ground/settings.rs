@@ -11,6 +11,9 @@ pub struct GroundSettings {
     /// Largest difference between the height of the camera above the plane and that of the mount, metres, where the
     /// height of the mount is known.
     pub height_tolerance_m: f32,
+    /// Surfaces whose middle lies within this distance of the plane are those that it is fitted to, metres. Not wider: kerbs
+    /// and verges would tilt it.
+    pub fit_tolerance_m: f32,
     /// A surface belongs to the ground if its middle lies within this distance of the plane, metres.
     pub surface_tolerance_m: f32,
     /// Allowance on top of it for each metre of range, metres: distances are less certain there, and the ground bends.
@@ -30,6 +33,7 @@ impl GroundSettings {
     pub(super) const UNSET: Self = Self {
         max_tilt_deg: 0.0,
         height_tolerance_m: 0.0,
+        fit_tolerance_m: 0.0,
         surface_tolerance_m: 0.0,
         surface_tolerance_per_m: 0.0,
         max_range_m: 0.0,
@@ -45,6 +49,7 @@ impl GroundSettings {
     pub fn check(&self) -> Result<(), ConfigError> {
         ConfigError::check("ground.max_tilt_deg", self.max_tilt_deg, 0.0, 45.0)?;
         ConfigError::check("ground.height_tolerance_m", self.height_tolerance_m, 0.0, 20.0)?;
+        ConfigError::check("ground.fit_tolerance_m", self.fit_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.surface_tolerance_m", self.surface_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.surface_tolerance_per_m", self.surface_tolerance_per_m, 0.0, 0.5)?;
         ConfigError::check("ground.max_range_m", self.max_range_m, 1.0, 1000.0)?;
@@ -59,10 +64,11 @@ impl Default for GroundSettings {
         Self {
             max_tilt_deg: 20.0,
             height_tolerance_m: 0.5,
-            surface_tolerance_m: 0.05,
-            surface_tolerance_per_m: 0.004,
+            fit_tolerance_m: 0.05,
+            surface_tolerance_m: 0.08,
+            surface_tolerance_per_m: 0.01,
             max_range_m: 25.0,
-            corridor_m: 2.5,
+            corridor_m: 1.0,
             min_support_permille: 2.0,
             hold_frames: 10,
         }

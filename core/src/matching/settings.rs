@@ -50,8 +50,8 @@ impl MatchSettings {
         min_disparity: 0,
         window: 7,
         prefilter: Prefilter::HorizontalSobel,
-        texture: 24,
-        uniqueness_percent: 5,
+        texture: 16,
+        uniqueness_percent: 8,
         back_check_px: Some(1),
         saturated_percent: 60,
     };

@@ -49,8 +49,9 @@ const HALF_LENGTH: f32 = 1.732_050_8;
 
 /// Joins surfaces that stand up from the ground into obstacles.
 ///
-/// Source: the paper, section 4.4. A surface takes part if it is near-vertical, or if it is neither that nor ground and its
-/// middle lies above the least height of an obstacle: a bonnet or a table top is no ground, however flat it is.
+/// Source: the paper, section 4.4. A surface takes part if it is near-vertical. What is neither vertical nor horizontal takes
+/// part if its middle lies above the least height of an obstacle, and what is horizontal if it lies so high that it is a bonnet
+/// or a table top rather than a lawn behind a kerb.
 ///
 /// # Bound
 /// The joining of regions, and three passes over the table of surfaces.
@@ -115,7 +116,8 @@ impl ObstacleFinder {
         match surface.class {
             SurfaceClass::Vertical | SurfaceClass::Obstacle => true,
             SurfaceClass::Ground => false,
-            SurfaceClass::Horizontal | SurfaceClass::Slanted | SurfaceClass::Undefined => {
+            SurfaceClass::Horizontal => ground.height_m(surface.points.mean_m) >= self.settings.platform_height_m,
+            SurfaceClass::Slanted | SurfaceClass::Undefined => {
                 ground.height_m(surface.points.mean_m) >= self.settings.min_height_m
             }
         }

@@ -8,6 +8,9 @@ use crate::error::ConfigError;
 pub struct ObstacleSettings {
     /// An obstacle reaches at least this height above the ground, metres. The paper, section 4.1: 0.25.
     pub min_height_m: f32,
+    /// Near-horizontal surfaces from this height on belong to obstacles, metres: below it they may be ground of another
+    /// level, above it no vehicle climbs.
+    pub platform_height_m: f32,
     /// What begins above this height can be driven under, metres.
     pub clearance_m: f32,
     /// An obstacle has at least this many pixels.
@@ -18,7 +21,8 @@ pub struct ObstacleSettings {
 
 impl ObstacleSettings {
     /// All zero, for a stage that is not configured.
-    pub(super) const UNSET: Self = Self { min_height_m: 0.0, clearance_m: 0.0, min_pixels: 0, min_size_m: 0.0 };
+    pub(super) const UNSET: Self =
+        Self { min_height_m: 0.0, platform_height_m: 0.0, clearance_m: 0.0, min_pixels: 0, min_size_m: 0.0 };
 
     /// Checks every value.
     ///
@@ -26,6 +30,7 @@ impl ObstacleSettings {
     /// The first value that cannot be used, named `obstacles.*`.
     pub fn check(&self) -> Result<(), ConfigError> {
         ConfigError::check("obstacles.min_height_m", self.min_height_m, 0.02, 5.0)?;
+        ConfigError::check("obstacles.platform_height_m", self.platform_height_m, self.min_height_m, 5.0)?;
         ConfigError::check("obstacles.clearance_m", self.clearance_m, self.min_height_m, 20.0)?;
         ConfigError::check("obstacles.min_pixels", f32::from(self.min_pixels), 0.0, 10_000.0)?;
         ConfigError::check("obstacles.min_size_m", self.min_size_m, 0.0, 5.0)
@@ -34,6 +39,6 @@ impl ObstacleSettings {
 
 impl Default for ObstacleSettings {
     fn default() -> Self {
-        Self { min_height_m: 0.25, clearance_m: 2.2, min_pixels: 40, min_size_m: 0.15 }
+        Self { min_height_m: 0.25, platform_height_m: 0.6, clearance_m: 2.2, min_pixels: 40, min_size_m: 0.15 }
     }
 }

@@ -1,6 +1,6 @@
 //! Triangles and leaves in a tree of boxes, so that a ray meets few of them.
 
-use super::vector::{V3, v3};
+use super::vector::{V3, least, most, v3};
 
 /// A triangle, or a parallelogram: the points `corner + u side_a + v side_b` with `u, v >= 0` and `u + v <= 1`, or both `<= 1`.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +72,7 @@ pub(crate) struct ShapeHit {
     pub(crate) id: u32,
 }
 
+/// A node of the tree as it is built, with two children.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     low: V3,
@@ -82,23 +83,35 @@ struct Node {
     count: u32,
 }
 
+/// A node of the tree as it is walked, with four children, coordinate by coordinate: the compiler makes vectors of them.
+#[derive(Clone, Copy, Debug)]
+struct Wide {
+    low: [[f32; 4]; 3],
+    high: [[f32; 4]; 3],
+    /// First shape of a leaf, or the child.
+    first: [u32; 4],
+    /// Number of shapes in a leaf; 0 for an inner node.
+    count: [u32; 4],
+}
+
+/// Coordinate of the box of a child that is not there: out of reach of every ray.
+const NOWHERE: f32 = 3.0e30;
+
 /// The tree.
 #[derive(Debug, Default)]
 pub(crate) struct Bvh {
-    nodes: Vec<Node>,
+    nodes: Vec<Wide>,
     shapes: Vec<Shape>,
 }
 
 const LEAF: usize = 4;
 const BINS: usize = 12;
-/// Deeper than any tree that halves a `u32` number of shapes by surface area in practice; deeper nodes become leaves.
-const MAX_DEPTH: usize = 56;
+/// Nodes below this depth are leaves, however many shapes they hold; bounds the stack of a walk.
+const MAX_DEPTH: usize = 32;
 
 impl Bvh {
     pub(crate) fn new(shapes: Vec<Shape>) -> Self {
-        let mut bvh = Self { nodes: Vec::with_capacity(shapes.len()), shapes };
-        let mut items: Vec<Item> = bvh
-            .shapes
+        let mut items: Vec<Item> = shapes
             .iter()
             .enumerate()
             .map(|(index, shape)| {
@@ -106,33 +119,41 @@ impl Bvh {
                 Item { low, high, centre: (low + high) * 0.5, index: index as u32 }
             })
             .collect();
+        let mut bvh = Self::default();
         if !items.is_empty() {
-            bvh.build(&mut items, 0, 0);
-            bvh.shapes = items.iter().map(|item| bvh.shapes[item.index as usize]).collect();
+            let mut pairs = Vec::with_capacity(shapes.len());
+            build(&mut pairs, &mut items, 0, 0);
+            bvh.shapes = items.iter().map(|item| shapes[item.index as usize]).collect();
+            bvh.widen(&pairs, 0);
         }
         bvh
     }
 
-
-    fn build(&mut self, items: &mut [Item], first: u32, depth: usize) {
-        let (mut low, mut high) = (items[0].low, items[0].high);
-        let (mut centre_low, mut centre_high) = (items[0].centre, items[0].centre);
-        for item in items.iter() {
-            (low, high) = (low.min(item.low), high.max(item.high));
-            (centre_low, centre_high) = (centre_low.min(item.centre), centre_high.max(item.centre));
+    /// Joins each node with the larger of its children, until it has four; says the number of the new node.
+    fn widen(&mut self, pairs: &[Node], index: usize) -> u32 {
+        let mut children = vec![index];
+        while children.len() < 4 {
+            let area = |i: usize| half_area(pairs[i].low, pairs[i].high);
+            let inner = children.iter().enumerate().filter(|(_, child)| pairs[**child].count == 0);
+            let Some((place, child)) = inner.max_by(|a, b| area(*a.1).total_cmp(&area(*b.1))) else { break };
+            let second = pairs[*child].first as usize;
+            let first = child + 1;
+            children[place] = first;
+            children.push(second);
         }
-        let node = self.nodes.len();
-        self.nodes.push(Node { low, first, high, count: items.len() as u32 });
-        if items.len() <= LEAF || depth >= MAX_DEPTH {
-            return;
+        let number = self.nodes.len();
+        let nowhere = [[NOWHERE; 4]; 3];
+        self.nodes.push(Wide { low: nowhere, high: nowhere, first: [0; 4], count: [0; 4] });
+        for (k, child) in children.into_iter().enumerate() {
+            let node = &pairs[child];
+            let first = if node.count == 0 { self.widen(pairs, child) } else { node.first };
+            let wide = &mut self.nodes[number];
+            for axis in 0..3 {
+                (wide.low[axis][k], wide.high[axis][k]) = (node.low.axis(axis), node.high.axis(axis));
+            }
+            (wide.first[k], wide.count[k]) = (first, node.count);
         }
-        let Some(middle) = split(items, centre_low, centre_high) else { return };
-        let (left, right) = items.split_at_mut(middle);
-        self.build(left, first, depth + 1);
-        let second = self.nodes.len() as u32;
-        self.build(right, first + middle as u32, depth + 1);
-        self.nodes[node].first = second;
-        self.nodes[node].count = 0;
+        number as u32
     }
 
     /// The nearest shape with `near < t < far`.
@@ -151,63 +172,87 @@ impl Bvh {
         }
         let inverse = v3(reciprocal(direction.x), reciprocal(direction.y), reciprocal(direction.z));
         let mut best = None;
-        let mut stack = [(0u32, 0.0f32); MAX_DEPTH + 2];
-        let mut top = 0;
-        let mut index = 0usize;
-        if entry(&self.nodes[0], origin, inverse, near, far).is_none() {
-            return None;
-        }
-        loop {
-            let node = &self.nodes[index];
-            if node.count > 0 {
-                let first = node.first as usize;
-                for shape in &self.shapes[first..first + node.count as usize] {
-                    if let Some((t, u, v)) = shape.hit(origin, direction)
-                        && t > near
-                        && t < far
-                    {
-                        far = t;
-                        best = Some(ShapeHit { t, u, v, id: shape.id });
-                        if ANY {
-                            return best;
+        // Three more wait for each level that is gone down.
+        let mut stack = [(0u32, 0u32, 0.0f32); 3 * MAX_DEPTH + 4];
+        let mut top = 1;
+        stack[0] = (0, 0, near);
+        while top > 0 {
+            top -= 1;
+            let (first, count, enter) = stack[top];
+            if enter >= far {
+                continue;
+            }
+            if count == 0 {
+                let wide = &self.nodes[first as usize];
+                let (enter, leave) = wide.cross(origin, inverse, near, far);
+                let bottom = top;
+                for k in 0..4 {
+                    if enter[k] <= leave[k] * 1.000_001 {
+                        // Kept in order, the nearest on top.
+                        let mut place = top;
+                        while place > bottom && stack[place - 1].2 < enter[k] {
+                            stack[place] = stack[place - 1];
+                            place -= 1;
                         }
-                    }
-                }
-            } else {
-                let (a, b) = (index + 1, node.first as usize);
-                let enter_a = entry(&self.nodes[a], origin, inverse, near, far);
-                let enter_b = entry(&self.nodes[b], origin, inverse, near, far);
-                match (enter_a, enter_b) {
-                    (Some(ta), Some(tb)) => {
-                        let (go, wait, t) = if ta <= tb { (a, b, tb) } else { (b, a, ta) };
-                        stack[top] = (wait as u32, t);
+                        stack[place] = (wide.first[k], wide.count[k], enter[k]);
                         top += 1;
-                        index = go;
-                        continue;
                     }
-                    (Some(_), None) => {
-                        index = a;
-                        continue;
-                    }
-                    (None, Some(_)) => {
-                        index = b;
-                        continue;
-                    }
-                    (None, None) => {}
                 }
+                continue;
             }
-            loop {
-                if top == 0 {
-                    return best;
-                }
-                top -= 1;
-                if stack[top].1 < far {
-                    index = stack[top].0 as usize;
-                    break;
+            for shape in &self.shapes[first as usize..(first + count) as usize] {
+                if let Some((t, u, v)) = shape.hit(origin, direction)
+                    && t > near
+                    && t < far
+                {
+                    far = t;
+                    best = Some(ShapeHit { t, u, v, id: shape.id });
+                    if ANY {
+                        return best;
+                    }
                 }
             }
         }
+        best
     }
+}
+
+impl Wide {
+    /// Where a ray enters and leaves each child.
+    #[inline]
+    fn cross(&self, origin: V3, inverse: V3, near: f32, far: f32) -> ([f32; 4], [f32; 4]) {
+        let (mut enter, mut leave) = ([near; 4], [far; 4]);
+        for axis in 0..3 {
+            let (o, i) = (origin.axis(axis), inverse.axis(axis));
+            for k in 0..4 {
+                let a = (self.low[axis][k] - o) * i;
+                let b = (self.high[axis][k] - o) * i;
+                enter[k] = most(enter[k], least(a, b));
+                leave[k] = least(leave[k], most(a, b));
+            }
+        }
+        (enter, leave)
+    }
+}
+
+fn build(nodes: &mut Vec<Node>, items: &mut [Item], first: u32, depth: usize) {
+    let (mut low, mut high) = (items[0].low, items[0].high);
+    let (mut centre_low, mut centre_high) = (items[0].centre, items[0].centre);
+    for item in items.iter() {
+        (low, high) = (low.min(item.low), high.max(item.high));
+        (centre_low, centre_high) = (centre_low.min(item.centre), centre_high.max(item.centre));
+    }
+    let node = nodes.len();
+    nodes.push(Node { low, first, high, count: items.len() as u32 });
+    if items.len() <= LEAF || depth >= MAX_DEPTH {
+        return;
+    }
+    let Some(middle) = split(items, centre_low, centre_high) else { return };
+    let (left, right) = items.split_at_mut(middle);
+    build(nodes, left, first, depth + 1);
+    nodes[node].first = nodes.len() as u32;
+    build(nodes, right, first + middle as u32, depth + 1);
+    nodes[node].count = 0;
 }
 
 #[derive(Clone, Copy)]
@@ -221,15 +266,6 @@ struct Item {
 /// Keeps 0 times infinity, which is not a number, out of the box test.
 fn reciprocal(x: f32) -> f32 {
     if x.abs() < 1.0e-12 { 1.0e12 } else { 1.0 / x }
-}
-
-fn entry(node: &Node, origin: V3, inverse: V3, near: f32, far: f32) -> Option<f32> {
-    let a = (node.low - origin).scaled(inverse);
-    let b = (node.high - origin).scaled(inverse);
-    let (low, high) = (a.min(b), a.max(b));
-    let enter = low.x.max(low.y).max(low.z.max(near));
-    let leave = high.x.min(high.y).min(high.z.min(far));
-    (enter <= leave * 1.000_001).then_some(enter)
 }
 
 fn half_area(low: V3, high: V3) -> f32 {

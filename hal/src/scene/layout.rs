@@ -10,12 +10,14 @@ use super::vector::{V3, v3};
 pub(crate) struct Planter<'a> {
     ground: &'a Ground,
     pub(crate) mesh: Mesh,
-    pub(crate) rng: Rng,
+    rng: Rng,
+    /// -1 where the scene is the mirror image of the usual one.
+    side: f32,
 }
 
 pub(crate) fn furnish(options: &SceneOptions, ground: &Ground) -> Mesh {
     let mut planter = Planter::new(ground, options.seed);
-    planter.grass(if options.content == Content::Rural { 1500 } else { 900 });
+    planter.grass(2200);
     planter.pebbles(90);
     if options.content == Content::Rural {
         planter.rural();
@@ -25,27 +27,26 @@ pub(crate) fn furnish(options: &SceneOptions, ground: &Ground) -> Mesh {
 
 impl<'a> Planter<'a> {
     pub(crate) fn new(ground: &'a Ground, seed: u32) -> Self {
-        Self { ground, mesh: Mesh::default(), rng: Rng::new(seed) }
+        let side = if seed.is_multiple_of(2) { -1.0 } else { 1.0 };
+        Self { ground, mesh: Mesh::default(), rng: Rng::new(seed), side }
     }
 
     fn rural(&mut self) {
         let mut jitter = |width: f32| self.rng.range(-width, width);
         let j: [f32; 12] = core::array::from_fn(|_| jitter(0.3));
         self.fence(4.6 + j[0], 9, -2.75);
-        self.wall(v3(9.6 + j[1], 4.3, 0.0), 3.4, 1.7, -0.5 + 0.4 * j[2]);
+        self.wall(v3(8.9 + j[1], 3.5, 0.0), 3.2, 1.6, -0.45 + 0.4 * j[2]);
         self.boulder(5.3 + j[3], 1.45 + 0.5 * j[4], 0.62);
-        self.boulder(7.9 + j[5], -1.25 + 0.4 * j[6], 0.5);
-        self.boulder(11.2 + j[7], 1.0 + j[8], 0.85);
-        self.boulder(6.3 + j[9], 3.3 + j[10], 0.7);
-        self.bush(4.4 + j[11], 3.0 + j[0], 0.62);
-        self.bush(7.3 + j[1], 2.4 + 0.5 * j[2], 0.5);
-        self.bush(8.6 + j[3], -4.6 + j[4], 0.85);
-        self.bush(6.2 + j[5], -4.2 + j[6], 0.7);
-        self.bush(13.0 + j[7], -4.4 + j[8], 1.1);
+        self.boulder(7.4 + j[5], -1.3 + 0.4 * j[6], 0.5);
+        self.boulder(10.4 + j[7], 0.9 + j[8], 0.8);
+        self.bush(5.0 + 0.5 * j[11], 2.5 + 0.4 * j[0], 0.5);
+        self.bush(6.9 + j[1], 2.5 + 0.5 * j[2], 0.6);
+        self.bush(9.4 + j[3], -1.95 + 0.3 * j[4], 0.42);
+        self.bush(13.5 + j[7], -5.0 + j[8], 1.2);
         self.bush(14.5 + j[9], 3.2 + j[10], 0.9);
         self.bush(17.5, 5.6 + j[0], 1.3);
-        self.tree(8.4 + j[2], 3.5 + j[3], 5.2, 0.16);
-        self.tree(10.6 + j[4], -3.8 + j[5], 6.4, 0.2);
+        self.tree(7.8 + j[2], 3.1 + 0.5 * j[3], 5.2, 0.16);
+        self.tree(9.2 + j[4], -4.0 + j[5], 6.2, 0.2);
         self.tree(15.5 + j[6], 5.0 + j[7], 7.0, 0.22);
         self.tree(19.0 + j[8], -6.0 + j[9], 7.6, 0.24);
         for i in 0..13 {
@@ -61,9 +62,9 @@ impl<'a> Planter<'a> {
         }
     }
 
-    /// The ground `aside_m` to the left of the trail.
+    /// The ground `aside_m` to the left of the trail; to the right in a mirrored scene.
     fn spot(&self, x: f32, aside_m: f32) -> V3 {
-        let y = self.ground.trail.y(x) + aside_m;
+        let y = self.ground.trail.y(x) + self.side * aside_m;
         v3(x, y, self.ground.height(x, y))
     }
 
@@ -78,7 +79,7 @@ impl<'a> Planter<'a> {
     fn pebbles(&mut self, count: usize) {
         for _ in 0..count {
             let (x, s) = (self.rng.range(0.8, 14.0), self.rng.range(-1.5, 1.5));
-            let size = self.rng.range(0.008, 0.03) + if self.rng.bits() % 7 == 0 { 0.03 } else { 0.0 };
+            let size = self.rng.range(0.008, 0.03) + if self.rng.bits().is_multiple_of(7) { 0.03 } else { 0.0 };
             let radii = v3(self.rng.range(0.9, 1.5), self.rng.range(0.9, 1.5), 0.75) * size;
             let centre = self.spot(x, s) + V3::UP * (0.25 * size);
             self.mesh.begin(V3::UP, size > 0.03);
@@ -91,7 +92,8 @@ impl<'a> Planter<'a> {
         self.mesh.begin(V3::UP, true);
         let leaf = (0.055 + 0.0025 * x).min(0.16);
         for _ in 0..3 {
-            let shift = v3(self.rng.range(-0.5, 0.5), self.rng.range(-0.5, 0.5), self.rng.range(-0.12, 0.15)) * radius_m;
+            let shift =
+                v3(self.rng.range(-0.5, 0.5), self.rng.range(-0.5, 0.5), self.rng.range(-0.12, 0.15)) * radius_m;
             let radii = v3(0.8, 0.8, 0.72) * (radius_m * self.rng.range(0.75, 1.0));
             let centre = spot + shift + V3::UP * (0.55 * radius_m);
             self.mesh.foliage(centre, radii, 40, 24, leaf, &mut self.rng);
@@ -105,10 +107,17 @@ impl<'a> Planter<'a> {
         let lean = v3(self.rng.range(-0.25, 0.25), self.rng.range(-0.25, 0.25), 0.0);
         let fork = spot + V3::UP * (0.5 * height_m) + lean;
         let rng = &mut self.rng;
-        self.mesh.limb(spot - V3::UP * 0.15, spot + V3::UP * 0.35, (radius_m * 1.5, radius_m), 0.22, Material::Bark, rng);
+        self.mesh.limb(
+            spot - V3::UP * 0.15,
+            spot + V3::UP * 0.35,
+            (radius_m * 1.5, radius_m),
+            0.22,
+            Material::Bark,
+            rng,
+        );
         self.mesh.limb(spot + V3::UP * 0.25, fork, (radius_m * 1.03, radius_m * 0.6), 0.12, Material::Bark, rng);
         let leaf = if near { 0.1 } else { 0.2 };
-        let crowns = if near { 7 } else { 5 };
+        let crowns = if near { 10 } else { 6 };
         for i in 0..crowns {
             let turn = core::f32::consts::TAU * (i as f32 + rng.range(-0.3, 0.3)) / crowns as f32;
             let (s, c) = libm::sincosf(turn);
@@ -117,9 +126,9 @@ impl<'a> Planter<'a> {
             let rise = (0.56 * height_m).max(3.4) + height_m * rng.range(0.0, 0.3);
             let end = spot + lean + v3(c * reach, s * reach, rise);
             self.mesh.limb(fork - V3::UP * rng.range(0.0, 0.3), end, (radius_m * 0.4, 0.02), 0.1, Material::Bark, rng);
-            let size = height_m * rng.range(0.13, 0.17);
-            let leaves = if near { 30 } else { 16 };
-            self.mesh.foliage(end, v3(1.15, 1.15, 0.85) * size, 26, leaves, leaf, rng);
+            let size = height_m * rng.range(0.09, 0.16);
+            let leaves = if near { 38 } else { 18 };
+            self.mesh.foliage(end, v3(1.15, 1.15, 0.85) * size, 30, leaves, leaf, rng);
         }
     }
 
@@ -137,8 +146,8 @@ impl<'a> Planter<'a> {
         }
         for pair in feet.windows(2) {
             for height in [0.38, 0.68, 0.98] {
-                let from = pair[0] + v3(0.0, 0.09, height + self.rng.range(-0.03, 0.03));
-                let to = pair[1] + v3(0.0, 0.09, height + self.rng.range(-0.03, 0.03));
+                let from = pair[0] + v3(0.0, 0.09 * self.side, height + self.rng.range(-0.03, 0.03));
+                let to = pair[1] + v3(0.0, 0.09 * self.side, height + self.rng.range(-0.03, 0.03));
                 let along = to - from;
                 let direction = along.unit();
                 self.mesh.begin(direction, true);
@@ -154,7 +163,7 @@ impl<'a> Planter<'a> {
     /// A plastered wall under a coping; `turn` is its bearing from across the trail, radians.
     pub(crate) fn wall(&mut self, at: V3, length_m: f32, height_m: f32, turn: f32) {
         let foot = self.spot(at.x, at.y);
-        let (s, c) = libm::sincosf(turn);
+        let (s, c) = libm::sincosf(turn * self.side);
         let (along, through) = (v3(s, c, 0.0), v3(c, -s, 0.0));
         self.mesh.begin(along, true);
         let middle = foot + V3::UP * (0.5 * height_m - 0.1);

@@ -23,12 +23,14 @@ const ROCK: Fractal = Fractal { wave_m: 0.5, octaves: 8, gain: 0.68, seed: 0x0c4
 const BARK: Fractal = Fractal { wave_m: 0.16, octaves: 6, gain: 0.72, seed: 0xba4c };
 const WOOD: Fractal = Fractal { wave_m: 0.09, octaves: 6, gain: 0.7, seed: 0x300d };
 const PLASTER: Fractal = Fractal { wave_m: 1.1, octaves: 9, gain: 0.66, seed: 0x91a5 };
+const THICKET: Fractal = Fractal { wave_m: 0.21, octaves: 5, gain: 0.85, seed: 0x741c };
 const LEAF: Fractal = Fractal { wave_m: 0.06, octaves: 3, gain: 0.7, seed: 0x1eaf };
 
 /// The ground at a point, seen by a pixel that covers `footprint_m` of it.
 pub(crate) fn ground(p: V3, trail: Trail, footprint_m: f32, seed: u32) -> Finish {
     let aside = (p.y - trail.y(p.x)).abs();
-    let ragged = 0.2 * noise2(p.x * 0.9, p.y * 0.9, seed ^ 3).value + 0.14 * noise2(p.x * 4.3, p.y * 4.3, seed ^ 5).value
+    let ragged = 0.2 * noise2(p.x * 0.9, p.y * 0.9, seed ^ 3).value
+        + 0.14 * noise2(p.x * 4.3, p.y * 4.3, seed ^ 5).value
         + 0.07 * noise2(p.x * 17.0, p.y * 17.0, seed ^ 6).value;
     let edge = smoothstep(1.2, 0.95, aside + ragged);
     let middle = 0.8 * smoothstep(0.36, 0.16, aside + 0.8 * ragged);
@@ -45,9 +47,9 @@ pub(crate) fn ground(p: V3, trail: Trail, footprint_m: f32, seed: u32) -> Finish
         let n = GRASS.plane(p.x, p.y, footprint_m);
         let m = STALK.plane(p.x, p.y, footprint_m);
         let dry = smoothstep(-0.2, 0.9, noise2(p.x * 0.45, p.y * 0.45, seed ^ 9).value + 0.35 * n.value);
-        let base = mix(0.135, 0.23, dry);
-        finish.albedo += grass * (base * (1.0 + 0.3 * n.value + 0.33 * m.value)).max(0.02);
-        finish.bump += v3(-n.dx - m.dx, -n.dy - m.dy, 0.0) * (0.006 * grass);
+        let base = mix(0.13, 0.195, dry);
+        finish.albedo += grass * (base * (1.0 + 0.4 * n.value + 0.5 * m.value)).max(0.02);
+        finish.bump += v3(-n.dx - m.dx, -n.dy - m.dy, 0.0) * (0.008 * grass);
     }
     finish
 }
@@ -100,7 +102,7 @@ pub(crate) fn thing(material: Material, p: V3, normal: V3, grain: V3, above_m: f
         Material::Bark => {
             let (n, g) = BARK.space(drawn(0.22), footprint_m);
             let crack = smoothstep(-0.1, -0.7, n);
-            finish.albedo = (0.19 * (1.0 + 0.5 * n)).max(0.03) * (1.0 - 0.6 * crack);
+            finish.albedo = (0.22 * (1.0 + 0.6 * n)).max(0.03) * (1.0 - 0.65 * crack);
             finish.bump = g * -0.011;
         }
         Material::Wood => {
@@ -115,7 +117,7 @@ pub(crate) fn thing(material: Material, p: V3, normal: V3, grain: V3, above_m: f
             let (streak, _) = super::noise::noise3(v3(p.x * 6.0, p.y * 6.0, p.z * 0.7), 0x57e4);
             let (patch, _) = super::noise::noise3(p * 2.1, 0x9a7c);
             let splash = smoothstep(0.5, 0.05, above_m + 0.22 * patch + 0.1 * n);
-            let bare = smoothstep(0.52, 0.6, patch + 0.16 * n);
+            let bare = smoothstep(0.5, 0.62, patch + 0.3 * n);
             let clean = 0.5 * (1.0 + 0.05 * n + 0.05 * streak);
             finish.albedo = mix(mix(clean, 0.33 * (1.0 + 0.3 * n), 0.8 * bare), 0.24 * (1.0 + 0.35 * n), 0.75 * splash);
             finish.bump = g * (-0.0015 - 0.004 * bare);
@@ -127,8 +129,14 @@ pub(crate) fn thing(material: Material, p: V3, normal: V3, grain: V3, above_m: f
         }
         Material::Leaf => {
             let (n, _) = LEAF.space(p, footprint_m);
-            finish.albedo = (0.17 * (1.0 + 0.3 * n)).max(0.02);
-            finish.through = 0.45;
+            finish.albedo = (0.2 * (1.0 + 0.35 * n)).max(0.02);
+            finish.through = 0.5;
+        }
+        Material::Thicket => {
+            let (n, g) = THICKET.space(p, footprint_m);
+            finish.albedo = (0.36 * smoothstep(-0.9, 1.4, n)).max(0.02);
+            finish.bump = g * -0.03;
+            finish.through = 0.3;
         }
         Material::Blade => {
             finish.albedo = 0.26 * smoothstep(-0.05, 0.09, above_m);

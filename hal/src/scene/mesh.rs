@@ -10,6 +10,8 @@ pub(crate) enum Material {
     Rock,
     Bark,
     Leaf,
+    /// The inside of a leafy body: leaves upon leaves.
+    Thicket,
     Blade,
     Wood,
     Plaster,
@@ -128,7 +130,9 @@ impl Mesh {
             let (s, c) = libm::sincosf(u * core::f32::consts::TAU);
             let ring = b * s + a * c;
             let axis = from + along * v.min(1.0);
-            let bulge = 1.0 + rough * noise3(ring * 1.7 + axis * 1.2, seed).0 + 0.5 * rough * noise3(axis * 4.0 + ring * 4.0, seed).0;
+            let bulge = 1.0
+                + rough * noise3(ring * 1.7 + axis * 1.2, seed).0
+                + 0.5 * rough * noise3(axis * 4.0 + ring * 4.0, seed).0;
             // The last ring closes the end.
             let r = if v > 0.999 { 0.002 } else { radii.0 + (radii.1 - radii.0) * v };
             axis + ring * (r * bulge)
@@ -151,14 +155,14 @@ impl Mesh {
     pub(crate) fn foliage(&mut self, centre: V3, radii: V3, clumps: usize, leaves: usize, leaf_m: f32, rng: &mut Rng) {
         let seed = rng.bits();
         let body_tint = rng.range(0.85, 1.2);
-        self.ball(10, Material::Leaf, 0.45, |d| {
-            centre + d.scaled(radii) * (0.72 + 0.16 * noise3(d * 2.6, seed).0)
+        self.ball(12, Material::Thicket, 0.8, |d| {
+            centre + d.scaled(radii) * (0.6 + 0.16 * noise3(d * 2.6, seed).0 + 0.07 * noise3(d * 6.3, seed).0)
         });
         let mean = (radii.x + radii.y + radii.z) / 3.0;
         let clump_m = (mean * 1.9 / (clumps as f32).sqrt()).max(leaf_m);
         for _ in 0..clumps {
             let d = rng.direction();
-            let middle = centre + d.scaled(radii) * (rng.range(0.72, 0.98) + 0.12 * noise3(d * 2.6, seed).0);
+            let middle = centre + d.scaled(radii) * (rng.range(0.6, 0.98) + 0.12 * noise3(d * 2.6, seed).0);
             let tint = body_tint * rng.range(0.78, 1.2);
             for _ in 0..leaves {
                 let mut out = rng.direction();

@@ -31,7 +31,7 @@ impl Pose {
     }
 
     /// A point of the world in the vehicle frame.
-    pub(crate) fn from_world(self, p: V3) -> V3 {
+    pub(crate) fn to_vehicle(self, p: V3) -> V3 {
         let q = p - self.origin;
         v3(q.dot(self.forward), q.dot(self.left), q.dot(self.up))
     }

@@ -54,7 +54,7 @@ pub struct SceneOptions {
     pub slope_start_m: f32,
     /// Height of the bumps of the ground over that of the default: 0 for a smooth ground.
     pub roughness: f32,
-    /// Read noise of the cameras, grey values (standard deviation); noise of the light comes on top in proportion. 0 for none.
+    /// Noise of the cameras, grey values (standard deviation); 0 for none.
     pub noise_sigma: f32,
     /// Exposure of the right camera over that of the left one.
     pub exposure_ratio: f32,
@@ -87,7 +87,7 @@ impl Default for SceneOptions {
             slope_deg: 0.0,
             slope_start_m: 2.5,
             roughness: 1.0,
-            noise_sigma: 1.0,
+            noise_sigma: 1.2,
             exposure_ratio: 1.08,
             distortion: None,
             misalignment: None,
@@ -137,11 +137,7 @@ impl SceneOptions {
 
     /// How the left camera sits on the vehicle.
     pub fn mount(&self) -> Mount {
-        Mount {
-            height_m: Some(self.mount_height_m),
-            pitch_down_deg: self.pitch_down_deg,
-            roll_deg: self.roll_deg,
-        }
+        Mount { height_m: Some(self.mount_height_m), pitch_down_deg: self.pitch_down_deg, roll_deg: self.roll_deg }
     }
 
     /// The exact calibration. With distortion or misalignment the pair is raw, and its rectified cameras are those of

@@ -23,6 +23,9 @@ pub(crate) enum Hit {
 /// Four rays a pixel, on a turned square: near-vertical and near-level edges get four shades each.
 const RAYS: [(f32, f32); 4] = [(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)];
 
+/// Size in pixels of the finest texture of a pixel that is looked at once.
+const COARSE: f32 = 0.62;
+
 const SUN: f32 = 1.05;
 const SKY: f32 = 0.36;
 /// Light that the ground gives back to what stands on it.
@@ -37,7 +40,10 @@ impl Scene {
     /// Eight rays a pixel.
     pub fn render(&self, frame: u32) -> RenderedPair {
         let [left, right] = self.eyes(frame);
-        RenderedPair { left: self.photograph(&left, frame, 0, 1.0), right: self.photograph(&right, frame, 1, self.options.exposure_ratio) }
+        RenderedPair {
+            left: self.photograph(&left, frame, 0, 1.0),
+            right: self.photograph(&right, frame, 1, self.options.exposure_ratio),
+        }
     }
 
     fn photograph(&self, eye: &Eye, frame: u32, side: u32, exposure: f32) -> Vec<u8> {
@@ -45,7 +51,7 @@ impl Scene {
         let mut light = vec![0.0f32; width * height];
         for_each_chunk(&mut light, width, |y, row| {
             for (x, pixel) in row.iter_mut().enumerate() {
-                *pixel = RAYS.iter().map(|(dx, dy)| self.light_along(eye, eye.look(x as f32 + dx, y as f32 + dy))).sum::<f32>() * 0.25;
+                *pixel = self.pixel(eye, x as f32, y as f32);
             }
         });
         let seed = hash(self.options.seed ^ hash(frame.wrapping_mul(2).wrapping_add(side)));
@@ -53,6 +59,35 @@ impl Scene {
         let mut grey = vec![0; width * height];
         sensor.expose(&light, &mut grey);
         grey
+    }
+
+    fn pixel(&self, eye: &Eye, x: f32, y: f32) -> f32 {
+        let [a, b, c, d] = RAYS.map(|(dx, dy)| eye.look(x + dx, y + dy));
+        let (hit_a, hit_c) = (self.meet(eye.origin, a), self.meet(eye.origin, c));
+        let light = |a, hit_a, c, hit_c| self.light_along(eye, a, hit_a) + self.light_along(eye, c, hit_c);
+        // Two rays do where there is no edge between them, and on the ground one look at what they meet.
+        match (hit_a, hit_c) {
+            (Hit::Ground(ta), Hit::Ground(tc)) if (ta - tc).abs() < 0.1 * ta => {
+                let t = 0.5 * (ta + tc);
+                let p = (a * ta + c * tc) * 0.5;
+                let light = self.ground_light(eye.origin + p, p, t * COARSE / eye.focal_px());
+                return hazy(light, t);
+            }
+            (Hit::Ground(_), Hit::Ground(_)) | (Hit::Far, Hit::Far) => return 0.5 * light(a, hit_a, c, hit_c),
+            (Hit::Thing(one), Hit::Thing(other)) if self.is_one_face(&one, &other) => {
+                return 0.5 * light(a, hit_a, c, hit_c);
+            }
+            _ => {}
+        }
+        let (hit_b, hit_d) = (self.meet(eye.origin, b), self.meet(eye.origin, d));
+        0.25 * (light(a, hit_a, c, hit_c) + light(b, hit_b, d, hit_d))
+    }
+
+    /// Whether two neighbouring rays meet the same smooth surface, so that there is nothing to be seen between them.
+    fn is_one_face(&self, one: &ShapeHit, other: &ShapeHit) -> bool {
+        let (a, b) = (&self.skins[one.id as usize], &self.skins[other.id as usize]);
+        let leafy = matches!(a.material, Material::Leaf | Material::Blade);
+        !leafy && a.object == b.object && a.material == b.material && (one.t - other.t).abs() < 0.02 * one.t
     }
 
     /// Follows a ray. `direction` is 1 long along the optical axis, so that the distances are depths.
@@ -66,9 +101,9 @@ impl Scene {
         }
     }
 
-    fn light_along(&self, eye: &Eye, direction: V3) -> f32 {
+    fn light_along(&self, eye: &Eye, direction: V3, hit: Hit) -> f32 {
         let pixel_rad = 0.5 / eye.focal_px();
-        match self.meet(eye.origin, direction) {
+        match hit {
             Hit::Far => sky::far(eye.origin, direction, pixel_rad, self.options.seed).0,
             Hit::Ground(t) => hazy(self.ground_light(eye.origin + direction * t, direction, t * pixel_rad), t),
             Hit::Thing(hit) => {

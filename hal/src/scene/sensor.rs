@@ -16,8 +16,8 @@ pub(crate) struct Sensor {
     pub(crate) seed: u32,
 }
 
-/// Light of a surface that comes out at about half of the range.
-const EXPOSURE: f32 = 1.7;
+/// Brings sunlit soil to the middle of the range.
+const EXPOSURE: f32 = 1.45;
 /// Weights of the blur of a good lens, about 0.5 px.
 const BLUR: [f32; 3] = [0.12, 0.76, 0.12];
 
@@ -27,7 +27,8 @@ impl Sensor {
         let (w, h) = (self.width, self.height);
         for_each_chunk(grey, w, |y, row| {
             let (above, below) = (y.saturating_sub(1), (y + 1).min(h - 1));
-            let column = |x: usize| BLUR[0] * light[above * w + x] + BLUR[1] * light[y * w + x] + BLUR[2] * light[below * w + x];
+            let column =
+                |x: usize| BLUR[0] * light[above * w + x] + BLUR[1] * light[y * w + x] + BLUR[2] * light[below * w + x];
             let (mut left, mut middle) = (column(0), column(0));
             for (x, pixel) in row.iter_mut().enumerate() {
                 let right = column((x + 1).min(w - 1));
@@ -42,11 +43,11 @@ impl Sensor {
         let (dx, dy) = ((x as f32 / self.width as f32 - 0.5) * 2.0, (y as f32 / self.height as f32 - 0.5) * 2.0);
         let corner = 1.0 - 0.1 * (dx * dx + dy * dy);
         let exposed = (light * EXPOSURE * self.exposure * corner).max(0.0);
-        // Highlights are rolled off, then the usual square-root coding.
-        let coded = (exposed * (1.0 + exposed * 0.12) / (1.0 + exposed)).min(1.0).sqrt();
+        // A straight foot, which keeps the shadows apart, and a long shoulder, which keeps the sky from burning out.
+        let coded = 0.94 * exposed / (0.5 + exposed) + 0.23 * exposed.sqrt();
         let value = 255.0 * coded;
-        // Under square-root coding the noise of the light is the same at every brightness.
-        let sigma = self.noise_sigma * 1.25;
+        // Under such coding the noise of the light is much the same at every brightness.
+        let sigma = self.noise_sigma;
         let noise = sigma * normal(self.seed, (y * self.width + x) as u32);
         (value + noise + 0.5).clamp(0.0, 255.0) as u8
     }

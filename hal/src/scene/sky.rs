@@ -5,7 +5,7 @@ use super::vector::{V3, mix, smoothstep};
 
 const CLOUD: Fractal = Fractal { wave_m: 2.6, octaves: 6, gain: 0.52, seed: 0xc10d };
 const RIDGE: Fractal = Fractal { wave_m: 0.5, octaves: 6, gain: 0.5, seed: 0x41d6 };
-const WOODS: Fractal = Fractal { wave_m: 0.03, octaves: 5, gain: 0.7, seed: 0x300d };
+const WOODS: Fractal = Fractal { wave_m: 0.014, octaves: 4, gain: 0.75, seed: 0x300d };
 
 /// Distance, height and darkness of the ridges, nearest first. They stand around the origin of the world.
 const RIDGES: [Ridge; 3] = [
@@ -24,7 +24,7 @@ struct Ridge {
 }
 
 /// Brightness of the haze in front of far things.
-pub(crate) const HAZE: f32 = 0.66;
+pub(crate) const HAZE: f32 = 0.6;
 
 /// Light that comes from far away along a ray, and the length of the ray to a ridge if there is one.
 pub(crate) fn far(origin: V3, direction: V3, pixel_rad: f32, seed: u32) -> (f32, Option<f32>) {
@@ -41,7 +41,7 @@ pub(crate) fn far(origin: V3, direction: V3, pixel_rad: f32, seed: u32) -> (f32,
         let top = ridge.base_m + ridge.rise_m * (0.8 * line.value + 0.13 * crown);
         if z < top {
             let n = WOODS.plane(a, z / ridge.radius_m * 1.3, pixel_rad);
-            let light = ridge.albedo * (1.0 + 0.45 * n.value * ridge.detail) * (1.05 - 0.3 * line.dx.clamp(-1.0, 1.0));
+            let light = ridge.albedo * (1.0 + 0.5 * n.value * ridge.detail) * (1.0 + 0.25 * line.value);
             return (mix(light, HAZE, ridge.haze), Some(t));
         }
     }
@@ -50,7 +50,7 @@ pub(crate) fn far(origin: V3, direction: V3, pixel_rad: f32, seed: u32) -> (f32,
     let height = 1.0 / (up + 0.06).max(0.03);
     let (x, y) = (direction.x * height, direction.y * height);
     let n = CLOUD.plane(x * 0.8, y * 0.8, pixel_rad * height).value + 0.25 * noise2(x * 0.2, y * 0.2, seed).value;
-    let cloud = smoothstep(-0.2, 0.75, n) * smoothstep(0.0, 0.1, up);
-    let blue = mix(0.86, 0.5, smoothstep(-0.02, 0.38, up));
-    (mix(blue, 1.06 - 0.18 * smoothstep(0.5, 1.2, n), 0.85 * cloud), None)
+    let cloud = smoothstep(-0.1, 0.6, n) * smoothstep(0.0, 0.12, up);
+    let blue = mix(0.78, 0.36, smoothstep(-0.02, 0.35, up));
+    (mix(blue, 1.15 - 0.35 * smoothstep(0.35, 1.1, n), 0.9 * cloud), None)
 }

@@ -33,7 +33,7 @@ pub struct TruthCells {
     pub cells: Vec<TruthCell>,
     /// Least distance ahead of cells that are judged, metres.
     pub nearest_m: f32,
-    /// Greatest distance ahead of cells that are judged, metres: where the disparity is 4 px.
+    /// Greatest distance ahead of cells that are judged, metres: where the disparity is 5 px.
     pub farthest_m: f32,
     /// Greatest distance to either side of cells that are judged, metres.
     pub aside_m: f32,
@@ -52,14 +52,14 @@ pub struct Truth {
 }
 
 /// Disparity below which cells are not judged, px.
-const LEAST_DISPARITY_PX: f32 = 4.0;
+const LEAST_DISPARITY_PX: f32 = 5.0;
 const NEAREST_M: f32 = 1.5;
 const ASIDE_M: f32 = 10.0;
-/// Heights above the local ground, metres, and pixels that make a cell an obstacle or free: those by which lidar sweeps
-/// are judged.
+/// Heights above the local ground, metres, that make a cell an obstacle or free: those by which lidar sweeps are judged.
 const OBSTACLE_M: core::ops::RangeInclusive<f32> = 0.3..=2.2;
 const HIGH_M: core::ops::RangeInclusive<f32> = 0.2..=2.2;
-const OBSTACLE_PIXELS: u32 = 3;
+/// Pixels that both cameras see. What covers fewer than this is smaller than a quarter of a 7 x 7 matching window.
+const OBSTACLE_PIXELS: u32 = 12;
 const FREE_PIXELS: u32 = 2;
 /// Spacing of the places in [`high_places`], metres.
 pub(crate) const MARK_M: f32 = 0.05;
@@ -117,12 +117,12 @@ impl Scene {
         let disparity_px = self.options.focal_px * self.options.baseline_m / depth_m;
         let disparity = (disparity_px * 256.0 + 0.5).clamp(0.0, 65535.0) as u16;
         let p = left.origin + look * depth_m;
-        let hidden = x - disparity_px < -0.5 || self.hides(right, p);
-        let v = pose.from_world(p);
+        let hidden = x - disparity_px < 0.0 || self.hides(right, p);
+        let v = pose.to_vehicle(p);
         let above_m = p.z - self.ground.height(p.x, p.y);
         let place = self.cell(v.x, v.y).map(|index| (index, above_m, thing));
-        // What the right camera's picture does not hold is not seen by both cameras.
-        let place = if x - disparity_px < 0.0 { None } else { place };
+        // Cells are judged by what both cameras see.
+        let place = if hidden { None } else { place };
         Seen { disparity, hidden, place }
     }
 
@@ -130,7 +130,8 @@ impl Scene {
         let (px, py, depth_m) = eye.project(p);
         let look = eye.look(px, py);
         let reach = depth_m - 0.004 - 0.002 * depth_m;
-        self.bvh.blocks(eye.origin, look, 0.05, reach) || self.ground.meet(eye.origin, look).is_some_and(|t| t < reach - 0.03)
+        self.bvh.blocks(eye.origin, look, 0.05, reach)
+            || self.ground.meet(eye.origin, look).is_some_and(|t| t < reach - 0.03)
     }
 
     fn cell(&self, x: f32, y: f32) -> Option<usize> {
@@ -152,14 +153,13 @@ impl Scene {
         }
         for (i, j) in &self.high {
             let (x, y) = ((f32::from(*i) + 0.5) * MARK_M, (f32::from(*j) + 0.5) * MARK_M);
-            let v = pose.from_world(v3(x, y, self.ground.height(x, y)));
+            let v = pose.to_vehicle(v3(x, y, self.ground.height(x, y)));
             if let Some(index) = self.cell(v.x, v.y) {
                 tallies[index].high = true;
             }
         }
         let farthest_m = self.options.focal_px * self.options.baseline_m / LEAST_DISPARITY_PX;
-        let mut cells =
-            TruthCells { geometry, cells: Vec::new(), nearest_m: NEAREST_M, farthest_m, aside_m: ASIDE_M };
+        let mut cells = TruthCells { geometry, cells: Vec::new(), nearest_m: NEAREST_M, farthest_m, aside_m: ASIDE_M };
         cells.cells = (0..)
             .zip(&tallies)
             .map(|(index, tally)| {

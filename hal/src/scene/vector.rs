@@ -38,11 +38,11 @@ impl V3 {
     }
 
     pub(crate) fn min(self, o: Self) -> Self {
-        v3(self.x.min(o.x), self.y.min(o.y), self.z.min(o.z))
+        v3(least(self.x, o.x), least(self.y, o.y), least(self.z, o.z))
     }
 
     pub(crate) fn max(self, o: Self) -> Self {
-        v3(self.x.max(o.x), self.y.max(o.y), self.z.max(o.z))
+        v3(most(self.x, o.x), most(self.y, o.y), most(self.z, o.z))
     }
 
     pub(crate) fn axis(self, i: usize) -> f32 {
@@ -99,6 +99,15 @@ impl Neg for V3 {
     fn neg(self) -> Self {
         v3(-self.x, -self.y, -self.z)
     }
+}
+
+/// One instruction, unlike `f32::min`, which has to look for NaN.
+pub(crate) fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+pub(crate) fn most(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// 0 below `a`, 1 above `b`, smooth between.
