@@ -6,7 +6,7 @@ use crate::{
     error::ConfigError,
     geometry::{DepthTable, Rays, RectifiedPair, VehicleFrame},
     ground::Terrain,
-    surfaces::{SurfaceClass, Surfaces, TILE},
+    surfaces::{Surface, SurfaceClass, Surfaces, TILE},
 };
 
 /// How the left camera sees the world.
@@ -23,6 +23,9 @@ pub struct View<'a, const DISPARITIES: usize> {
     /// Nearest distance along the optical axis that the search range reaches, metres.
     pub nearest_m: f32,
 }
+
+/// Error of a disparity that must be expected, px: it makes a plane look rough in proportion to the distance.
+const HEIGHT_NOISE_PX: f32 = 0.3;
 
 /// What the pixels say of one cell.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,6 +46,8 @@ enum Role {
     Nothing,
     Ground,
     Obstacle,
+    /// Ground and object in one surface: each pixel speaks for itself.
+    Mixed,
     Other,
 }
 
@@ -132,13 +137,8 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         for (pixel, &label) in picture.row(y)[x0..end].iter().zip(labels) {
             if label != current {
                 current = label;
-                let class = usize::from(label).checked_sub(1).and_then(|i| table.get(first + i)).map(|s| s.class);
-                role = match class {
-                    None => Role::Nothing,
-                    Some(SurfaceClass::Ground) => Role::Ground,
-                    Some(SurfaceClass::Obstacle) => Role::Obstacle,
-                    Some(_) => Role::Other,
-                };
+                let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(first + i));
+                role = surface.map_or(Role::Nothing, |surface| self.role(surface, view, camera_height));
             }
             if role != Role::Nothing {
                 let z = view.depth.distance_m(pixel.steps());
@@ -148,11 +148,11 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
                 if let Some(evidence) = self.settings.geometry.index(cell.0, cell.1).map(|i| &mut self.evidence[i]) {
                     let too_high = height > self.settings.free_max_height_m;
                     match role {
-                        Role::Obstacle if height >= min_height && height <= clearance => {
+                        Role::Obstacle | Role::Mixed if height >= min_height && height <= clearance => {
                             evidence.obstacle = evidence.obstacle.saturating_add(1);
                             evidence.height_dm = evidence.height_dm.max((height * 10.0) as u8);
                         }
-                        Role::Ground if !too_high => evidence.ground = evidence.ground.saturating_add(1),
+                        Role::Ground | Role::Mixed if !too_high => evidence.ground = evidence.ground.saturating_add(1),
                         _ if too_high && height <= clearance => evidence.unclear = evidence.unclear.saturating_add(1),
                         _ => {}
                     }
@@ -162,6 +162,26 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
                 direction[i] += step[i];
             }
             climb += climb_step;
+        }
+    }
+
+    /// What the pixels of a surface count as. A surface within the limits of the ground that is much rougher than the
+    /// matching makes a plane look holds more than ground: a stone and the ground around it, in one tile.
+    fn role<const DISPARITIES: usize>(
+        &self,
+        surface: &Surface,
+        view: &View<'_, DISPARITIES>,
+        camera_height_m: f32,
+    ) -> Role {
+        let [x, y, _] = surface.points.mean_m;
+        let range = libm::sqrtf(x * x + y * y);
+        let noise = HEIGHT_NOISE_PX * camera_height_m * range / (view.pair.focal_px * view.pair.baseline_m);
+        let rough = surface.rms_m > self.settings.mixed_rms_m + noise;
+        match surface.class {
+            SurfaceClass::Obstacle => Role::Obstacle,
+            SurfaceClass::Ground if rough => Role::Mixed,
+            SurfaceClass::Ground => Role::Ground,
+            _ => Role::Other,
         }
     }
 
