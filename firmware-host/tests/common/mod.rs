@@ -117,8 +117,10 @@ impl Run {
     pub(crate) fn assert_frames(&self, frames: &[u32]) -> &Self {
         assert_eq!(self.frames_in("ground.csv"), frames);
         for folder in ["disparity", "classes", "map"] {
-            let mut names: Vec<_> =
-                fs::read_dir(self.out.join(folder)).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+            let mut names: Vec<_> = fs::read_dir(self.out.join(folder))
+                .unwrap()
+                .map(|e| e.unwrap().file_name().into_string().unwrap())
+                .collect();
             names.sort();
             let expected: Vec<_> = frames.iter().map(|number| format!("{number:06}.png")).collect();
             assert_eq!(names, expected, "{folder}");
