@@ -62,6 +62,9 @@ pub struct DemoArgs {
     /// Number of frames to render.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
+    /// Also write the rendered pictures to this folder, as a recording to replay.
+    #[arg(long, value_name = "DIR")]
+    pub record: Option<PathBuf>,
     /// Settings of the detector and of the bus.
     #[command(flatten)]
     pub detector: DetectorArgs,
@@ -69,7 +72,7 @@ pub struct DemoArgs {
 
 impl Default for DemoArgs {
     fn default() -> Self {
-        Self { out: "out/demo".into(), frames: 8, detector: DetectorArgs::default() }
+        Self { out: "out/demo".into(), frames: 8, record: None, detector: DetectorArgs::default() }
     }
 }
 

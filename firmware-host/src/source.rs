@@ -1,13 +1,12 @@
 //! Where the pictures come from: a recording or the scene renderer.
 
-use std::{convert::Infallible, ops::Range, path::Path};
+use std::{ops::Range, path::Path};
 
 use fencepost_core::geometry::{Mount, StereoCalibration};
 use fencepost_hal::{
     calibration::CalibrationError,
     camera::Camera,
     recording::{RecordedCamera, Recording, RecordingError},
-    scene::SceneCamera,
 };
 
 use crate::error::Failure;
@@ -30,13 +29,6 @@ impl Source for RecordedCamera {
 
     fn take_warnings(&mut self) -> Vec<String> {
         self.take_warnings().iter().map(ToString::to_string).collect()
-    }
-}
-
-impl Source for SceneCamera {
-    /// A rendered frame never fails, so that nobody needs to know which one it would have been.
-    fn upcoming(&self) -> Option<(u32, u64)> {
-        None
     }
 }
 
@@ -96,12 +88,6 @@ impl Input<RecordedCamera> {
             warnings: recording.warnings.iter().map(ToString::to_string).collect(),
             source: recording.into_camera(),
         })
-    }
-}
-
-impl From<Infallible> for Failure {
-    fn from(never: Infallible) -> Self {
-        match never {}
     }
 }
 
