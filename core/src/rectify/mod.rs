@@ -41,9 +41,8 @@ pub const fn grid_nodes(width: usize, height: usize) -> usize {
 #[derive(Clone, Debug)]
 pub struct Rectifier<const GRID: usize> {
     pair: RectifiedPair,
-    /// Whether there is something to do: not for pictures that arrive rectified. False at first, so that a rectifier that is
-    /// not configured is all zero.
-    remaps: bool,
+    /// Whether the pictures arrive rectified.
+    pass_through: bool,
     left: Camera<GRID>,
     right: Camera<GRID>,
 }
@@ -66,7 +65,7 @@ impl<const GRID: usize> Rectifier<GRID> {
             baseline_m: 0.0,
             disparity_offset_px: 0.0,
         };
-        Self { pair, remaps: false, left: Camera::new(), right: Camera::new() }
+        Self { pair, pass_through: true, left: Camera::new(), right: Camera::new() }
     }
 
     /// Takes a calibration and returns the rectified pair that the rows belong to.
@@ -85,7 +84,7 @@ impl<const GRID: usize> Rectifier<GRID> {
             StereoCalibration::Rectified(pair) => {
                 pair.check()?;
                 self.pair = *pair;
-                self.remaps = false;
+                self.pass_through = true;
             }
             StereoCalibration::Raw(raw) => {
                 let (pair, [left, right]) = CameraMap::pair(raw)?;
@@ -98,7 +97,7 @@ impl<const GRID: usize> Rectifier<GRID> {
                 self.left.fill(left, width, height);
                 self.right.fill(right, width, height);
                 self.pair = pair;
-                self.remaps = true;
+                self.pass_through = false;
             }
         }
         Ok(self.pair)
@@ -111,7 +110,7 @@ impl<const GRID: usize> Rectifier<GRID> {
 
     /// The rotation from the raw camera's frame into the rectified one, row by row; none for pairs that arrive rectified.
     pub const fn rotation(&self, side: Side) -> Option<&[[f32; 3]; 3]> {
-        if self.remaps { Some(self.camera(side).map.rotation()) } else { None }
+        if self.pass_through { None } else { Some(self.camera(side).map.rotation()) }
     }
 
     /// Writes row `y` of the rectified picture to `out` and returns its valid columns: the longest run of pixels whose
@@ -130,7 +129,7 @@ impl<const GRID: usize> Rectifier<GRID> {
         if row.is_empty() {
             return 0..0;
         }
-        if self.remaps {
+        if !self.pass_through {
             let camera = self.camera(side);
             let source = Source::new(raw, camera.map.raw_size());
             return sample_row(camera.grid.segments(y), &source, row);
@@ -147,7 +146,7 @@ impl<const GRID: usize> Rectifier<GRID> {
     /// Where the raw picture shows what belongs at `(u, v)` of the rectified one, px, by the full model in f32. The place
     /// may lie outside of the picture; `None` where the lens model folds back or the ray points backwards.
     pub fn source_of(&self, side: Side, u: f32, v: f32) -> Option<(f32, f32)> {
-        if !self.remaps {
+        if self.pass_through {
             return Some((u, v));
         }
         self.camera(side).map.source(u, v).map(|[x, y]| (x, y))
