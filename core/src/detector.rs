@@ -6,7 +6,7 @@ use crate::{
     disparity::{DisparityPicture, DisparityPixel},
     error::ConfigError,
     geometry::{DepthTable, Mount, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
-    ground::{GroundFinder, GroundPlane},
+    ground::{GroundFinder, GroundPlane, Terrain},
     health::{Health, HealthLevel},
     map::{CellState, MapBuilder, ObstacleMap, SectorDistances, View},
     matching::{MatchSettings, Matcher, ValidSpan},
@@ -252,17 +252,20 @@ impl<
 
         probe.enter(Stage::Ground);
         let ground = self.ground.run(&mut self.surfaces, &mut self.regions, picture);
-        let plane = ground.unwrap_or(GroundPlane::of_mount(&setup.frame));
+        let terrain = match ground {
+            Some(plane) => self.ground.terrain(plane, self.surfaces.table()),
+            None => Terrain::flat(GroundPlane::of_mount(&setup.frame)),
+        };
 
         probe.enter(Stage::Obstacles);
         let detection = &mut self.detection;
         detection.statistics.obstacles_dropped =
-            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &plane, &mut detection.obstacles);
+            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &mut detection.obstacles);
 
         probe.enter(Stage::Map);
         let Setup { pair, frame, rays, nearest_m } = &setup;
         let view = View { pair, frame, rays, depth: &self.depth, nearest_m: *nearest_m };
-        self.map.run(&self.surfaces, picture, &view, &plane, ground.is_some(), &mut detection.map);
+        self.map.run(&self.surfaces, picture, &view, &terrain, ground.is_some(), &mut detection.map);
         detection.sectors = SectorDistances::of(&detection.map);
         detection.ground = ground;
         detection.statistics.count(picture, report, self.surfaces.table(), &detection.map);

@@ -5,7 +5,7 @@ use crate::{
     disparity::{DisparityPicture, Reason},
     error::ConfigError,
     geometry::{DepthTable, Rays, RectifiedPair, VehicleFrame},
-    ground::GroundPlane,
+    ground::Terrain,
     surfaces::{SurfaceClass, Surfaces, TILE},
 };
 
@@ -83,7 +83,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         surfaces: &Surfaces<PIXELS, SURFACES>,
         picture: DisparityPicture<'_>,
         view: &View<'_, DISPARITIES>,
-        ground: &GroundPlane,
+        ground: &Terrain,
         ground_seen: bool,
         map: &mut ObstacleMap<CELLS>,
     ) {
@@ -110,7 +110,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         surfaces: &Surfaces<PIXELS, SURFACES>,
         picture: DisparityPicture<'_>,
         view: &View<'_, DISPARITIES>,
-        ground: &GroundPlane,
+        ground: &Terrain,
         (x0, y): (usize, usize),
     ) {
         let end = (x0 + TILE).min(picture.width());
@@ -122,10 +122,11 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let table = surfaces.table();
         let (min_height, clearance) = self.obstacle_heights_m;
         let per_cell = 1.0 / self.settings.geometry.cell_size_m();
-        let camera_height = ground.height_m(view.rays.origin_m);
+        let plane = ground.plane();
+        let camera_height = plane.height_m(view.rays.origin_m);
         let mut direction = view.rays.direction(x0 as f32, y as f32);
         let step = view.rays.along_row;
-        let rise = |d: [f32; 3]| d[0] * ground.normal[0] + d[1] * ground.normal[1] + d[2] * ground.normal[2];
+        let rise = |d: [f32; 3]| d[0] * plane.normal[0] + d[1] * plane.normal[1] + d[2] * plane.normal[2];
         let (mut climb, climb_step) = (rise(direction), rise(step));
         let (mut current, mut role) = (0, Role::Nothing);
         for (pixel, &label) in picture.row(y)[x0..end].iter().zip(labels) {
@@ -141,11 +142,9 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             }
             if role != Role::Nothing {
                 let z = view.depth.distance_m(pixel.steps());
-                let height = camera_height + z * climb;
-                let cell = (
-                    floor((view.rays.origin_m[0] + z * direction[0]) * per_cell),
-                    floor((view.rays.origin_m[1] + z * direction[1]) * per_cell),
-                );
+                let x = view.rays.origin_m[0] + z * direction[0];
+                let height = camera_height + z * climb - ground.lift_m(x);
+                let cell = (floor(x * per_cell), floor((view.rays.origin_m[1] + z * direction[1]) * per_cell));
                 if let Some(evidence) = self.settings.geometry.index(cell.0, cell.1).map(|i| &mut self.evidence[i]) {
                     let too_high = height > self.settings.free_max_height_m;
                     match role {
@@ -172,7 +171,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         index: usize,
         picture: DisparityPicture<'_>,
         view: &View<'_, DISPARITIES>,
-        ground: &GroundPlane,
+        ground: &Terrain,
         ground_seen: bool,
     ) -> Cell {
         let geometry = self.settings.geometry;
@@ -188,7 +187,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         // Pixels that a metre takes at this distance, across and, foreshortened, along the ground.
         let per_m = view.pair.focal_px / seen.distance_m;
         let across = geometry.cell_size_m() * per_m;
-        let along = across * (ground.camera_height_m / seen.distance_m).min(1.0);
+        let along = across * (ground.plane().camera_height_m / seen.distance_m).min(1.0);
         let obstacle_area = across * self.obstacle_heights_m.0 * per_m;
         let need_obstacle =
             (self.settings.obstacle_cover * obstacle_area).max(f32::from(self.settings.obstacle_min_pixels));
@@ -233,10 +232,12 @@ impl Sight {
         x: f32,
         y: f32,
         view: &View<'_, DISPARITIES>,
-        ground: &GroundPlane,
+        ground: &Terrain,
     ) -> Option<Self> {
-        let [nx, ny, nz] = ground.normal;
-        let z = if nz.abs() > 1.0e-3 { (ground.offset_m - nx * x - ny * y) / nz } else { 0.0 };
+        let plane = ground.plane();
+        let [nx, ny, nz] = plane.normal;
+        let level = plane.offset_m + ground.lift_m(x);
+        let z = if nz.abs() > 1.0e-3 { (level - nx * x - ny * y) / nz } else { 0.0 };
         let origin = view.rays.origin_m;
         let [right, down, distance_m] = view.frame.to_camera([x - origin[0], y - origin[1], z - origin[2]]);
         if distance_m <= 0.0 {
