@@ -153,10 +153,8 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         let pixels = picture.pixels();
         let mut found = 0;
         for tile in Tile::all(self.width, self.height) {
-            let SurfaceSettings { step_sixteenths, min_pixels, .. } = self.settings;
             let covers = |steps| depth.inverse(steps) != 0;
-            let labels = &mut self.labels[..];
-            found += u32::from(self.union.label(pixels, self.width, tile, step_sixteenths, min_pixels, covers, labels));
+            found += u32::from(self.union.label(pixels, self.width, tile, &self.settings, covers, &mut self.labels));
         }
         let mut keep = KeepRule::everything();
         if found as usize > SURFACES {
