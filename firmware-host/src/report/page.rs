@@ -17,7 +17,7 @@ use crate::{
     console::WarningCount,
     error::Failure,
     paint,
-    session::{FrameRecord, Log},
+    pipeline::{FrameRecord, Log},
     summary,
 };
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::{
-    session::Log,
+    pipeline::Log,
     summary::{self, StageTimes},
     words,
 };
