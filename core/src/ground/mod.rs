@@ -77,7 +77,8 @@ impl GroundFinder {
             let age_frames = last.age_frames.saturating_add(1);
             (age_frames <= self.settings.hold_frames).then_some(GroundPlane { age_frames, ..last })
         });
-        self.last = plane;
+        // Without holding, no frame has a say in the next.
+        self.last = plane.filter(|_| self.settings.hold_frames > 0);
         if let Some(plane) = plane {
             for surface in surfaces.table_mut() {
                 if surface.class == SurfaceClass::Horizontal && self.lies_on(&plane, surface) {
@@ -190,3 +191,6 @@ impl Default for GroundFinder {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests;
