@@ -26,6 +26,7 @@ use crate::{
     source::{Input, Source},
     stopwatch::{FrameTimes, Stopwatch, milliseconds},
     view::FrameView,
+    words,
 };
 
 /// Everything a run needs besides its pictures.
@@ -289,8 +290,12 @@ fn not_looked_at(error: DetectError, number: u32) -> Failure {
     }
 }
 
-/// Says what makes a frame less than true: each reason for its first frames, the rest are counted.
+/// Says how a frame went, to who asked for it, and what makes it less than true: each reason for its first frames, the rest are counted.
 fn say_health(console: &mut Console, record: Option<&FrameRecord>, health: Health) {
+    if let Some(FrameRecord { number, times, obstacles, .. }) = record {
+        let level = words::level_name(health.level);
+        console.note(format_args!("frame {number}: {obstacles} obstacles, health {level}, {:.1} ms", times.total_ms));
+    }
     if health.level == HealthLevel::Ok {
         return;
     }

@@ -119,6 +119,8 @@ pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<St
         |error: minijinja::Error| Failure::work(format!("the report cannot be made: {error:#}")).at("report.html");
     environment.add_template("report.html", TEMPLATE).map_err(wrong)?;
     let records = &input.log.frames;
+    // One frame makes no course of time.
+    let course = if records.len() > 1 { records.as_slice() } else { &[] };
     let page = Page {
         name: input.name,
         description: input.description,
@@ -130,10 +132,10 @@ pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<St
         first_timestamp_ns: records.first().map_or(0, |f| f.timestamp_ns),
         ground_colour: paint::hex(paint::GROUND),
         obstacle_colour: paint::hex(paint::OBSTACLE),
-        ground_charts: ground_charts(records, input.mount),
-        map_charts: map_charts(records),
+        ground_charts: ground_charts(course, input.mount),
+        map_charts: map_charts(course),
         stages: stage_rows(&summary::stage_times(records)),
-        time_chart: time_chart(records),
+        time_chart: time_chart(course),
         strip: strip(input.log),
         levels: level_rows(input.log),
         reasons: reason_rows(input.log),
