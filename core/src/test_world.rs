@@ -9,7 +9,7 @@ use crate::{
     disparity::DisparityPicture,
     disparity::{DisparityPixel, Reason},
     geometry::{DepthTable, Mount, Rays, RectifiedPair, VehicleFrame},
-    ground::{GroundFinder, GroundPlane, GroundSettings},
+    ground::{GroundFinder, GroundPlane, GroundSettings, Terrain},
     obstacles::{Obstacle, ObstacleFinder, ObstacleSettings},
     surfaces::{Regions, SurfaceSettings, Surfaces},
 };
@@ -187,8 +187,8 @@ pub(crate) struct Stages {
     pub(crate) regions: Box<Regions<1024>>,
     pub(crate) ground: GroundFinder,
     pub(crate) obstacles: ObstacleFinder,
-    depth: DepthTable<DISPARITIES>,
-    rays: Rays,
+    pub(crate) depth: DepthTable<DISPARITIES>,
+    pub(crate) rays: Rays,
     pub(crate) frame: VehicleFrame,
 }
 
@@ -219,16 +219,24 @@ impl Stages {
         self.ground.run(&mut self.surfaces, &mut self.regions, picture)
     }
 
+    /// Where heights are measured from.
+    pub(crate) fn terrain(&self, ground: Option<GroundPlane>) -> Terrain {
+        match ground {
+            Some(plane) => self.ground.terrain(plane, self.surfaces.table()),
+            None => Terrain::flat(GroundPlane::of_mount(&self.frame)),
+        }
+    }
+
     /// All of them: the ground, the obstacles and how many were dropped.
     pub(crate) fn run<const OBSTACLES: usize>(
         &mut self,
         pixels: &[DisparityPixel],
     ) -> (Option<GroundPlane>, Vec<Obstacle>, u32) {
         let ground = self.ground(pixels);
-        let plane = ground.unwrap_or(GroundPlane::of_mount(&self.frame));
+        let terrain = self.terrain(ground);
         let mut obstacles = heapless::Vec::<_, OBSTACLES, u16>::new();
         let picture = DisparityPicture::new(pixels, 320);
-        let dropped = self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &plane, &mut obstacles);
+        let dropped = self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &mut obstacles);
         (ground, obstacles.to_vec(), dropped)
     }
 }

@@ -97,18 +97,17 @@ fn of_two_levels_the_one_ahead_is_the_ground() {
     let off = errors(&plane, &world);
     assert!(off[0].abs() < 0.03 && off[1].abs() < 0.5 && off[2].abs() < 0.8, "{off:?}");
 
-    // Higher than any tolerance: the deck stays horizontal and does not become ground.
-    world.patches[1].middle.z = 0.5;
+    // Higher than any tolerance and apart from the ground: a table top stays horizontal and does not become ground.
+    world.patches[1] = Patch::new([3.5, 0.9, 0.5], [0.7, 0.0, 0.0], [0.0, 0.7, 0.0]);
     let plane = stages.ground(&world.render()).unwrap();
     assert!(errors(&plane, &world)[0].abs() < 0.03, "{plane:?}");
-    let deck =
-        |s: &&Surface| (s.points.mean_m[2] - 0.5).abs() < 0.1 && s.points.mean_m[1] > 1.6 && s.points.mean_m[0] < 12.0;
+    let deck = |s: &&Surface| (s.points.mean_m[2] - 0.5).abs() < 0.05 && s.points.mean_m[0] < 5.0;
     let (mut horizontal, mut ground) = (0, 0);
     for surface in stages.surfaces.table().iter().filter(deck) {
         horizontal += u32::from(surface.class == SurfaceClass::Horizontal);
         ground += u32::from(surface.class == SurfaceClass::Ground);
     }
-    assert!(horizontal > 3 && ground == 0, "{horizontal} horizontal, {ground} ground");
+    assert!(horizontal > 0 && ground == 0, "{horizontal} horizontal, {ground} ground");
 }
 
 #[test]
