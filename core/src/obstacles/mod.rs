@@ -192,3 +192,6 @@ fn insert<const N: usize>(obstacles: &mut Vec<Obstacle, N, u16>, obstacle: Obsta
     let _ = obstacles.insert(place, obstacle);
     u32::from(full)
 }
+
+#[cfg(test)]
+mod tests;
