@@ -11,8 +11,8 @@ use fencepost_hal::{
 use crate::at_hand::ROOT;
 
 /// How goldens are renewed; for messages of tests.
-pub const HOW_TO_BLESS: &str = "If the change is meant, run `BLESS=1 cargo test -p fencepost-tests` and commit the files that \
-                                change, saying why. See docs/testing.md.";
+pub const HOW_TO_BLESS: &str = "If the change is meant, run `BLESS=1 cargo test -p fencepost-tests golden` and commit the files \
+                                that change, saying why. See docs/testing.md.";
 
 /// The folder of the recording.
 pub fn recording() -> PathBuf {

@@ -34,6 +34,7 @@ fn road_against_lidar() {
 
 #[test]
 fn rendered_scenes_against_their_truth() {
+    let mut below = Vec::new();
     for seed in SEEDS {
         let total = score_scene(SceneOptions { seed, ..SceneOptions::default() });
         let (f1, false_alarm, missed_free) = (total.f1(), total.false_alarm(), total.missed_free());
@@ -44,8 +45,11 @@ fn rendered_scenes_against_their_truth() {
             total.obstacles
         );
         assert!(total.obstacles > 50 && total.free > 1000, "scene {seed} has something to find: {total:?}");
-        assert!(f1 >= 0.97, "scene {seed}: F1 {f1}: {total:?}");
+        if f1 < 0.97 {
+            below.push((seed, f1));
+        }
     }
+    assert_eq!(below, [], "scenes with an F1 below 0.97");
 }
 
 /// Detects in every frame of a scene with the program's settings and scores the cells.
