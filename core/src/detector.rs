@@ -3,11 +3,11 @@
 use heapless::Vec;
 
 use crate::{
-    disparity::{DisparityPicture, DisparityPixel},
+    disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
     geometry::{DepthTable, Mount, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
-    ground::{GroundFinder, GroundPlane},
-    health::{Health, HealthLevel},
+    ground::{GroundFinder, GroundPlane, Terrain},
+    health::{self, Exposure, Health, HealthLevel, HealthSettings, Signs},
     map::{CellState, MapBuilder, ObstacleMap, SectorDistances, View},
     matching::{MatchSettings, Matcher, ValidSpan},
     obstacles::{Obstacle, ObstacleFinder},
@@ -30,12 +30,21 @@ pub enum Stage {
     Ground = 4,
     Obstacles = 5,
     Map = 6,
+    Health = 7,
 }
 
 impl Stage {
     /// Every stage in order.
-    pub const ALL: [Self; 7] =
-        [Self::Rectify, Self::Match, Self::Validate, Self::Surfaces, Self::Ground, Self::Obstacles, Self::Map];
+    pub const ALL: [Self; 8] = [
+        Self::Rectify,
+        Self::Match,
+        Self::Validate,
+        Self::Surfaces,
+        Self::Ground,
+        Self::Obstacles,
+        Self::Map,
+        Self::Health,
+    ];
 
     /// Name as it is written in summaries.
     pub const fn name(self) -> &'static str {
@@ -47,6 +56,7 @@ impl Stage {
             Self::Ground => "ground",
             Self::Obstacles => "obstacles",
             Self::Map => "map",
+            Self::Health => "health",
         }
     }
 }
@@ -63,6 +73,12 @@ pub trait Probe {
 impl Probe for () {
     fn enter(&mut self, _stage: Stage) {}
 }
+
+/// Rows that are matched the other way round when left and right may be exchanged.
+const EXCHANGE_ROWS: usize = 8;
+
+/// Share of their pixels that must match that way.
+const EXCHANGED_SHARE: f32 = 0.25;
 
 /// Counts that say how a frame went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -144,6 +160,9 @@ pub struct Detector<
     ground: GroundFinder,
     obstacles: ObstacleFinder,
     map: MapBuilder<CELLS>,
+    health: HealthSettings,
+    /// One row of disparities, for looking at a few rows the other way round.
+    probe_row: [DisparityPixel; WIDTH],
     detection: Detection<OBSTACLES, CELLS>,
 }
 
@@ -181,6 +200,8 @@ impl<
             ground: GroundFinder::new(),
             obstacles: ObstacleFinder::new(),
             map: MapBuilder::new(),
+            health: HealthSettings::UNSET,
+            probe_row: [DisparityPixel::from_bits(0); WIDTH],
             detection: Detection::new(),
         }
     }
@@ -209,6 +230,8 @@ impl<
         self.ground.configure(&settings.ground, &frame, mount.height_m.is_some(), width * height)?;
         self.obstacles.configure(&settings.obstacles)?;
         self.map.configure(&settings.map, (settings.obstacles.min_height_m, settings.obstacles.clearance_m))?;
+        settings.health.check()?;
+        self.health = settings.health;
         // The last disparity has no neighbour to interpolate with and is never reported.
         let largest = f32::from(min_disparity) + f32::from(disparities) - 2.0;
         let nearest_m = pair.distance_m(largest);
@@ -252,20 +275,36 @@ impl<
 
         probe.enter(Stage::Ground);
         let ground = self.ground.run(&mut self.surfaces, &mut self.regions, picture);
-        let plane = ground.unwrap_or(GroundPlane::of_mount(&setup.frame));
+        let terrain = match ground {
+            Some(plane) => self.ground.terrain(plane, self.surfaces.table()),
+            None => Terrain::flat(GroundPlane::of_mount(&setup.frame)),
+        };
 
         probe.enter(Stage::Obstacles);
         let detection = &mut self.detection;
         detection.statistics.obstacles_dropped =
-            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &plane, &mut detection.obstacles);
+            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &mut detection.obstacles);
 
         probe.enter(Stage::Map);
         let Setup { pair, frame, rays, nearest_m } = &setup;
         let view = View { pair, frame, rays, depth: &self.depth, nearest_m: *nearest_m };
-        self.map.run(&self.surfaces, picture, &view, &plane, ground.is_some(), &mut detection.map);
+        self.map.run(&self.surfaces, picture, &view, &terrain, ground.is_some(), &mut detection.map);
         detection.sectors = SectorDistances::of(&detection.map);
         detection.ground = ground;
         detection.statistics.count(picture, report, self.surfaces.table(), &detection.map);
+
+        probe.enter(Stage::Health);
+        let suspect = 100.0 * self.detection.statistics.coverage() < self.health.exchange_test_percent;
+        let exchanged = suspect && self.matches_exchanged(left, right, width, height);
+        let signs = Signs {
+            left: Exposure::of(left),
+            right: Exposure::of(right),
+            picture: DisparityPicture::new(&self.disparity[..width * height], width),
+            statistics: &self.detection.statistics,
+            ground: self.detection.ground.as_ref(),
+            exchanged,
+        };
+        self.detection.health = health::judge(&signs, &self.health);
         Ok(&self.detection)
     }
 
@@ -299,6 +338,38 @@ impl<
                 next += 1;
             }
         }
+    }
+
+    /// Whether the pictures match far better when left and right are exchanged, seen on a few rows.
+    ///
+    /// # Bound
+    /// The matching of `EXCHANGE_ROWS x (window + 2)` rows.
+    fn matches_exchanged(&mut self, left: &Picture<'_>, right: &Picture<'_>, width: usize, height: usize) -> bool {
+        let [left_row, right_row] = &mut self.rows;
+        let (left_row, right_row) = (&mut left_row[..width], &mut right_row[..width]);
+        // The first row that is not at the border of the picture is complete when this many have come.
+        let margin = usize::from(self.matcher.settings().window) / 2 + 1;
+        let needed = 2 * margin + 1;
+        let mut matched = 0;
+        for strip in 0..EXCHANGE_ROWS {
+            let top = (height * (strip + 1) / (EXCHANGE_ROWS + 1)).saturating_sub(margin);
+            self.matcher.begin();
+            for y in top..top + needed {
+                let left_span = self.rectifier.row(Side::Left, right, y.min(height - 1), left_row);
+                let right_span = self.rectifier.row(Side::Right, left, y.min(height - 1), right_row);
+                self.matcher.push(left_row, right_row, ValidSpan::from(left_span), ValidSpan::from(right_span));
+            }
+            let row = &mut self.probe_row[..width];
+            if self.matcher.pull(margin, row) {
+                matched += row.iter().filter(|pixel| pixel.has_value()).count();
+            }
+        }
+        let share = matched as f32 / (EXCHANGE_ROWS * width) as f32;
+        // False matches are scattered, and the validation by surface size is not run here: they are counted on both sides.
+        let statistics = &self.detection.statistics;
+        let as_given = statistics.pixels_with_disparity + statistics.pixels_without[Reason::SmallSurface as usize];
+        let as_given = as_given as f32 / (width * height) as f32;
+        share >= EXCHANGED_SHARE && share > 2.0 * as_given
     }
 
     /// What the last pair of pictures said.
@@ -401,6 +472,12 @@ impl Statistics {
         cells_obstacle: 0,
         cells_free: 0,
     };
+
+    /// Share of the pixels that have a disparity.
+    pub fn coverage(&self) -> f32 {
+        let without: u32 = self.pixels_without.iter().sum();
+        self.pixels_with_disparity as f32 / (self.pixels_with_disparity + without).max(1) as f32
+    }
 
     fn count<const CELLS: usize>(
         &mut self,

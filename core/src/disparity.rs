@@ -122,7 +122,11 @@ pub struct DisparityPicture<'a> {
 impl<'a> DisparityPicture<'a> {
     /// Sees `pixels` as rows of `width`. Pixels that do not fill a row are left out.
     pub const fn new(pixels: &'a [DisparityPixel], width: usize) -> Self {
-        let height = if width == 0 { 0 } else { pixels.len() / width };
+        let height = match pixels.len().checked_div(width) {
+            Some(height) => height,
+            None => 0,
+        };
+        let (pixels, _rest) = pixels.split_at(width * height);
         Self { pixels, width, height }
     }
 
@@ -136,9 +140,9 @@ impl<'a> DisparityPicture<'a> {
         self.height
     }
 
-    /// Row `y` from the top.
+    /// Row `y` from the top; empty below the picture.
     pub fn row(&self, y: usize) -> &'a [DisparityPixel] {
-        &self.pixels[y * self.width..(y + 1) * self.width]
+        if y < self.height { &self.pixels[y * self.width..(y + 1) * self.width] } else { &[] }
     }
 
     /// All pixels, row by row.

@@ -36,3 +36,5 @@ pub mod wire;
 
 #[cfg(test)]
 mod test_random;
+#[cfg(test)]
+mod test_world;

@@ -1,8 +1,8 @@
 //! Every setting that changes the result, with its unit and its reason.
 
 use crate::{
-    ground::GroundSettings, map::MapSettings, matching::MatchSettings, obstacles::ObstacleSettings,
-    surfaces::SurfaceSettings, validate::ValidateSettings,
+    ground::GroundSettings, health::HealthSettings, map::MapSettings, matching::MatchSettings,
+    obstacles::ObstacleSettings, surfaces::SurfaceSettings, validate::ValidateSettings,
 };
 
 /// The settings of all stages. The defaults serve every camera.
@@ -21,4 +21,6 @@ pub struct Settings {
     pub obstacles: ObstacleSettings,
     /// Cells.
     pub map: MapSettings,
+    /// Health.
+    pub health: HealthSettings,
 }

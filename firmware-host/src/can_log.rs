@@ -105,8 +105,8 @@ impl CanLog {
         self.advance(view.timestamp_ns)?;
         self.due_heartbeats(view.timestamp_ns, true)?;
         let detection = view.detection;
-        // The low 16 bits of the frame's number: a frame that is missing leaves a gap that a receiver sees.
-        let scan_index = view.number as u16;
+        // Counts the scans and not the frames: a gap would tell a receiver that it has missed something.
+        let scan_index = self.counts.scans as u16;
         let scan = Scan {
             scan_index,
             age_ns: 0,

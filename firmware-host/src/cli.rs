@@ -21,22 +21,28 @@ pub struct Cli {
 
 const AFTER_HELP: &str = "\
 Examples:
-  fencepost                                    run the demo: a rendered scene, written to out/demo/
-  fencepost check ~/recordings/garden          what is in a recording, how far and how near it can see
+  fencepost
+      Run the demo: a rendered scene, written to out/demo/
+  fencepost check ~/recordings/garden
+      What is in a recording, how far and how near it can see
   fencepost replay ~/recordings/garden --out out/garden
-                                               detect obstacles in every pair, write tables, pictures,
-                                               a CAN log and report.html
+      Detect obstacles in every pair; write tables, pictures, a CAN log and
+      report.html
   fencepost replay garden --out out --frames 100..200 --write cells,can
-                                               only frames 100 to 199, only the tables and the CAN log
-  fencepost can decode out/garden/can.log      the messages of a CAN log as text
+      Only frames 100 to 199, only the tables and the CAN log
+  fencepost can decode out/garden/can.log
+      The messages of a CAN log as text
 
-A recording is a folder in the layout of KITTI odometry (image_0/, image_1/, calib.txt, times.txt; rectified)
-or of EuRoC ASL (mav0/cam0/, mav0/cam1/; raw). A file mount.json beside it says how high and how far tilted
-the left camera is: {\"height_m\": 0.9, \"pitch_down_deg\": 15.0, \"roll_deg\": 0.0}
+Recordings:
+  A folder in the layout of KITTI odometry (image_0/, image_1/, calib.txt,
+  times.txt; rectified) or of EuRoC ASL (mav0/cam0/, mav0/cam1/; raw). A file
+  mount.json beside it says how high and how far tilted the left camera is:
+  {\"height_m\": 0.9, \"pitch_down_deg\": 15.0, \"roll_deg\": 0.0}
 
 Exit status:
   0  everything worked
-  1  the work failed or the input is bad: a recording, a picture, a calibration, a CAN log, a full disk
+  1  the work failed or the input is bad: a recording, a picture,
+     a calibration, a CAN log, a full disk
   2  the program was called wrongly, or its configuration cannot be used";
 
 /// What to do.
@@ -62,6 +68,9 @@ pub struct DemoArgs {
     /// Number of frames to render.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
+    /// Also write the rendered pictures to this folder, as a recording to replay.
+    #[arg(long, value_name = "DIR")]
+    pub record: Option<PathBuf>,
     /// Settings of the detector and of the bus.
     #[command(flatten)]
     pub detector: DetectorArgs,
@@ -69,7 +78,7 @@ pub struct DemoArgs {
 
 impl Default for DemoArgs {
     fn default() -> Self {
-        Self { out: "out/demo".into(), frames: 8, detector: DetectorArgs::default() }
+        Self { out: "out/demo".into(), frames: 8, record: None, detector: DetectorArgs::default() }
     }
 }
 

@@ -148,6 +148,32 @@ mod tests {
     }
 
     #[test]
+    fn every_setting_is_documented_with_its_default() {
+        let documented = include_str!("../../docs/files.md");
+        let text = toml::to_string(&Settings::default()).unwrap();
+        let mut section = String::new();
+        for line in text.lines().filter(|line| !line.is_empty()) {
+            if let Some(name) = line.strip_prefix('[') {
+                section = name.trim_end_matches(']').to_string();
+                continue;
+            }
+            let (name, value) = line.split_once(" = ").unwrap();
+            let name = format!("`{section}.{name}`");
+            let row = documented.lines().find(|row| row.contains(&name));
+            let row = row.unwrap_or_else(|| panic!("{name} is not in docs/files.md"));
+            let value = value.trim_end_matches(".0");
+            // The number of disparities follows the width of the pictures.
+            assert!(
+                row.contains(value) || name.contains(".disparities"),
+                "{name} is {value}, but docs/files.md says: {row}"
+            );
+        }
+        for name in ["base_id", "node", "format", "max_cell_frames"] {
+            assert!(documented.contains(&format!("`wire.{name}`")));
+        }
+    }
+
+    #[test]
     fn mistakes_name_the_line() {
         let unknown = read("[matching]\nwindow = 7\nwindov = 9\n").unwrap_err();
         assert_eq!(unknown.kind.exit_status(), 2);

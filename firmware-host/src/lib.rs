@@ -1,7 +1,7 @@
 //! The program `fencepost`: stereo pictures in, obstacle cells on CAN out, and everything to look at what happens between.
 //!
 //! ```text
-//! cli ──> commands ──> session ──> detector (fencepost-core)
+//! cli ──> commands ──> pipeline ──> detector (fencepost-core)
 //!           demo         │  frame by frame, as a view
 //!           replay       ├──> can_log    can.log
 //!           check        ├──> output     cells.csv, obstacles.csv, ground.csv
@@ -24,8 +24,8 @@ pub mod detector;
 pub mod error;
 pub mod output;
 pub mod paint;
+pub mod pipeline;
 pub mod report;
-pub mod session;
 pub mod source;
 pub mod stopwatch;
 pub mod summary;

@@ -1,13 +1,12 @@
 //! Where the pictures come from: a recording or the scene renderer.
 
-use std::{convert::Infallible, ops::Range, path::Path};
+use std::{ops::Range, path::Path};
 
 use fencepost_core::geometry::{Mount, StereoCalibration};
 use fencepost_hal::{
     calibration::CalibrationError,
     camera::Camera,
     recording::{RecordedCamera, Recording, RecordingError},
-    scene::SceneCamera,
 };
 
 use crate::error::Failure;
@@ -30,13 +29,6 @@ impl Source for RecordedCamera {
 
     fn take_warnings(&mut self) -> Vec<String> {
         self.take_warnings().iter().map(ToString::to_string).collect()
-    }
-}
-
-impl Source for SceneCamera {
-    /// A rendered frame never fails, so that nobody needs to know which one it would have been.
-    fn upcoming(&self) -> Option<(u32, u64)> {
-        None
     }
 }
 
@@ -99,49 +91,58 @@ impl Input<RecordedCamera> {
     }
 }
 
-impl From<Infallible> for Failure {
-    fn from(never: Infallible) -> Self {
-        match never {}
-    }
-}
-
 impl From<RecordingError> for Failure {
     fn from(error: RecordingError) -> Self {
-        let place = match &error {
+        let (subject, place) = match &error {
             RecordingError::NotAFolder(path) | RecordingError::UnknownLayout(path) | RecordingError::NoFrames(path) => {
-                path.display().to_string()
+                ("the recording".to_string(), path.display().to_string())
             }
-            RecordingError::Io { path, .. }
-            | RecordingError::MissingPicture { path, .. }
+            RecordingError::Io { path, .. } => ("the file".to_string(), path.display().to_string()),
+            RecordingError::MissingPicture { path, .. }
             | RecordingError::BadPicture { path, .. }
             | RecordingError::SizesDiffer { path, .. }
-            | RecordingError::SizeDiffersFromCalibration { path, .. } => path.display().to_string(),
-            RecordingError::Mount { file, field, .. } if field.is_empty() => file.display().to_string(),
-            RecordingError::Mount { file, field, .. } => format!("{}: {field}", file.display()),
-            RecordingError::Line { file, line, .. } => format!("{}: line {line}", file.display()),
-            RecordingError::Unwritable { folder, .. } => folder.display().to_string(),
+            | RecordingError::SizeDiffersFromCalibration { path, .. } => {
+                ("the picture".to_string(), path.display().to_string())
+            }
+            RecordingError::Mount { file, field, .. } => subject_and_place(file, field),
+            RecordingError::Line { file, line, .. } => {
+                ("the line".to_string(), format!("{}: line {line}", file.display()))
+            }
+            RecordingError::Unwritable { folder, .. } => ("the folder".to_string(), folder.display().to_string()),
             RecordingError::Calibration(error) => return error.clone().into(),
         };
-        from_sentence(&error.to_string(), place)
+        from_sentence(&error.to_string(), &subject, place)
     }
 }
 
 impl From<CalibrationError> for Failure {
     fn from(error: CalibrationError) -> Self {
-        let place = match error.field.as_str() {
-            "" => error.file.display().to_string(),
-            field => format!("{}: {field}", error.file.display()),
-        };
-        from_sentence(&error.to_string(), place)
+        let (subject, place) = subject_and_place(&error.file, &error.field);
+        from_sentence(&error.to_string(), &subject, place)
     }
 }
 
-/// Errors of the hardware layer are one sentence, `place: what; mend`.
-fn from_sentence(sentence: &str, place: String) -> Failure {
+fn subject_and_place(file: &Path, field: &str) -> (String, String) {
+    match field {
+        "" => ("the file".to_string(), file.display().to_string()),
+        field => (field.to_string(), format!("{}: {field}", file.display())),
+    }
+}
+
+/// Errors of the hardware layer are one sentence, `place: what; mend`, where `what` may go on from the place ("is missing").
+fn from_sentence(sentence: &str, subject: &str, place: String) -> Failure {
+    const VERBS: [&str; 5] = ["is ", "has ", "holds ", "must ", "cannot "];
     let rest = sentence.replacen(&format!("{place}: "), "", 1);
-    match rest.split_once("; ") {
-        Some((what, mend)) => Failure::work(what).at(place).mend(mend),
-        None => Failure::work(rest).at(place),
+    let (what, mend) = rest.split_once("; ").map_or((rest.as_str(), None), |(what, mend)| (what, Some(mend)));
+    let (frame, what) = match what.split_once(": ") {
+        Some((frame, what)) if frame.starts_with("frame ") => (format!("{frame}: "), what),
+        _ => (String::new(), what),
+    };
+    let subject = if VERBS.iter().any(|verb| what.starts_with(verb)) { format!("{subject} ") } else { String::new() };
+    let failure = Failure::work(format!("{frame}{subject}{what}")).at(place);
+    match mend {
+        Some(mend) => failure.mend(mend),
+        None => failure,
     }
 }
 
@@ -153,7 +154,7 @@ mod tests {
     fn sentences_come_apart() {
         let missing = RecordingError::MissingPicture { frame: 3, path: "r/image_1/000003.png".into() };
         let failure = Failure::from(missing);
-        assert_eq!(failure.what, "frame 3: is missing");
+        assert_eq!(failure.what, "frame 3: the picture is missing");
         assert_eq!(failure.place.as_deref(), Some("r/image_1/000003.png"));
         assert_eq!(failure.mend.as_deref(), Some("copy it again from where it was recorded"));
 
@@ -165,6 +166,6 @@ mod tests {
         };
         let failure = Failure::from(mount);
         assert_eq!(failure.place.as_deref(), Some("r/mount.json: height_m"));
-        assert_eq!((failure.what.as_str(), failure.mend.as_deref()), ("is not a number", Some("give metres")));
+        assert_eq!((failure.what.as_str(), failure.mend.as_deref()), ("height_m is not a number", Some("give metres")));
     }
 }

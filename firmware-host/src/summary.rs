@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use crate::{
     console::WarningCount,
-    session::{FrameRecord, Job, Log},
+    pipeline::{FrameRecord, Job, Log},
     source::Input,
     stopwatch::TimeSummary,
     words,

@@ -76,6 +76,10 @@ pub struct RawPair {
 
 /// What is known of a pair of cameras.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is no heap to put the larger one on, and one value per pair of cameras"
+)]
 pub enum StereoCalibration {
     /// The pictures arrive rectified.
     Rectified(RectifiedPair),

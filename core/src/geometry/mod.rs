@@ -12,3 +12,6 @@ pub use calibration::{CameraModel, Distortion, RawPair, Rectification, Rectified
 pub use depth::DepthTable;
 pub use mount::{Mount, VehicleFrame};
 pub use rays::Rays;
+
+#[cfg(test)]
+mod tests;

@@ -2,9 +2,11 @@
 
 mod plane;
 mod settings;
+mod terrain;
 
 pub use plane::GroundPlane;
 pub use settings::GroundSettings;
+pub use terrain::Terrain;
 
 use crate::{
     disparity::DisparityPicture,
@@ -16,6 +18,9 @@ use crate::{
 
 /// Rounds of choosing the surfaces near the plane and fitting it again. The choice settles after two or three.
 const REFINEMENTS: usize = 4;
+
+/// Share of a region's pixels that must lie on the plane for the rest of the region to be ground too.
+const REGION_SHARE: f32 = 0.2;
 
 /// Regions that a plane is grown from, largest first.
 const REGIONS: usize = 3;
@@ -79,13 +84,41 @@ impl GroundFinder {
         });
         self.last = plane;
         if let Some(plane) = plane {
-            for surface in surfaces.table_mut() {
-                if surface.class == SurfaceClass::Horizontal && self.lies_on(&plane, surface) {
+            self.spread(&plane, surfaces, regions);
+        }
+        plane
+    }
+
+    /// The ground as it bends, after [`Self::run`].
+    pub fn terrain(&self, plane: GroundPlane, table: &[Surface]) -> Terrain {
+        Terrain::of(plane, table, self.settings.corridor_m)
+    }
+
+    /// Gives the class of ground to the near-horizontal surfaces on the plane, and to those that hang together with them:
+    /// ground that bends away from the plane is ground all the same.
+    fn spread<const PIXELS: usize, const SURFACES: usize>(
+        &self,
+        plane: &GroundPlane,
+        surfaces: &mut Surfaces<PIXELS, SURFACES>,
+        regions: &Regions<SURFACES>,
+    ) {
+        for root in regions.roots() {
+            let table = surfaces.table();
+            let (mut on_plane, mut all) = (0, 0);
+            for surface in regions.members(root).filter_map(|place| table.get(place)) {
+                if surface.class == SurfaceClass::Horizontal {
+                    all += surface.pixels();
+                    on_plane += if self.lies_on(plane, surface) { surface.pixels() } else { 0 };
+                }
+            }
+            let grows = on_plane as f32 >= self.min_support && on_plane as f32 >= REGION_SHARE * all as f32;
+            for place in regions.members(root) {
+                let Some(surface) = surfaces.table_mut().get_mut(place) else { continue };
+                if surface.class == SurfaceClass::Horizontal && (grows || self.lies_on(plane, surface)) {
                     surface.class = SurfaceClass::Ground;
                 }
             }
         }
-        plane
     }
 
     /// Whether a surface is near-horizontal and where ground can be, for all tilts and heights that are allowed.

@@ -5,8 +5,8 @@ use crate::{
     disparity::{DisparityPicture, Reason},
     error::ConfigError,
     geometry::{DepthTable, Rays, RectifiedPair, VehicleFrame},
-    ground::GroundPlane,
-    surfaces::{SurfaceClass, Surfaces, TILE},
+    ground::Terrain,
+    surfaces::{Surface, SurfaceClass, Surfaces, TILE},
 };
 
 /// How the left camera sees the world.
@@ -23,6 +23,9 @@ pub struct View<'a, const DISPARITIES: usize> {
     /// Nearest distance along the optical axis that the search range reaches, metres.
     pub nearest_m: f32,
 }
+
+/// Error of a disparity that must be expected, px: it makes a plane look rough in proportion to the distance.
+const HEIGHT_NOISE_PX: f32 = 0.3;
 
 /// What the pixels say of one cell.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,6 +46,8 @@ enum Role {
     Nothing,
     Ground,
     Obstacle,
+    /// Ground and object in one surface: each pixel speaks for itself.
+    Mixed,
     Other,
 }
 
@@ -83,7 +88,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         surfaces: &Surfaces<PIXELS, SURFACES>,
         picture: DisparityPicture<'_>,
         view: &View<'_, DISPARITIES>,
-        ground: &GroundPlane,
+        ground: &Terrain,
         ground_seen: bool,
         map: &mut ObstacleMap<CELLS>,
     ) {
@@ -110,7 +115,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         surfaces: &Surfaces<PIXELS, SURFACES>,
         picture: DisparityPicture<'_>,
         view: &View<'_, DISPARITIES>,
-        ground: &GroundPlane,
+        ground: &Terrain,
         (x0, y): (usize, usize),
     ) {
         let end = (x0 + TILE).min(picture.width());
@@ -122,38 +127,32 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let table = surfaces.table();
         let (min_height, clearance) = self.obstacle_heights_m;
         let per_cell = 1.0 / self.settings.geometry.cell_size_m();
-        let camera_height = ground.height_m(view.rays.origin_m);
+        let plane = ground.plane();
+        let camera_height = plane.height_m(view.rays.origin_m);
         let mut direction = view.rays.direction(x0 as f32, y as f32);
         let step = view.rays.along_row;
-        let rise = |d: [f32; 3]| d[0] * ground.normal[0] + d[1] * ground.normal[1] + d[2] * ground.normal[2];
+        let rise = |d: [f32; 3]| d[0] * plane.normal[0] + d[1] * plane.normal[1] + d[2] * plane.normal[2];
         let (mut climb, climb_step) = (rise(direction), rise(step));
         let (mut current, mut role) = (0, Role::Nothing);
         for (pixel, &label) in picture.row(y)[x0..end].iter().zip(labels) {
             if label != current {
                 current = label;
-                let class = usize::from(label).checked_sub(1).and_then(|i| table.get(first + i)).map(|s| s.class);
-                role = match class {
-                    None => Role::Nothing,
-                    Some(SurfaceClass::Ground) => Role::Ground,
-                    Some(SurfaceClass::Obstacle) => Role::Obstacle,
-                    Some(_) => Role::Other,
-                };
+                let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(first + i));
+                role = surface.map_or(Role::Nothing, |surface| self.role(surface, view, camera_height));
             }
             if role != Role::Nothing {
                 let z = view.depth.distance_m(pixel.steps());
-                let height = camera_height + z * climb;
-                let cell = (
-                    floor((view.rays.origin_m[0] + z * direction[0]) * per_cell),
-                    floor((view.rays.origin_m[1] + z * direction[1]) * per_cell),
-                );
+                let x = view.rays.origin_m[0] + z * direction[0];
+                let height = camera_height + z * climb - ground.lift_m(x);
+                let cell = (floor(x * per_cell), floor((view.rays.origin_m[1] + z * direction[1]) * per_cell));
                 if let Some(evidence) = self.settings.geometry.index(cell.0, cell.1).map(|i| &mut self.evidence[i]) {
                     let too_high = height > self.settings.free_max_height_m;
                     match role {
-                        Role::Obstacle if height >= min_height && height <= clearance => {
+                        Role::Obstacle | Role::Mixed if height >= min_height && height <= clearance => {
                             evidence.obstacle = evidence.obstacle.saturating_add(1);
                             evidence.height_dm = evidence.height_dm.max((height * 10.0) as u8);
                         }
-                        Role::Ground if !too_high => evidence.ground = evidence.ground.saturating_add(1),
+                        Role::Ground | Role::Mixed if !too_high => evidence.ground = evidence.ground.saturating_add(1),
                         _ if too_high && height <= clearance => evidence.unclear = evidence.unclear.saturating_add(1),
                         _ => {}
                     }
@@ -166,13 +165,33 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         }
     }
 
+    /// What the pixels of a surface count as. A surface within the limits of the ground that is much rougher than the
+    /// matching makes a plane look holds more than ground: a stone and the ground around it, in one tile.
+    fn role<const DISPARITIES: usize>(
+        &self,
+        surface: &Surface,
+        view: &View<'_, DISPARITIES>,
+        camera_height_m: f32,
+    ) -> Role {
+        let [x, y, _] = surface.points.mean_m;
+        let range = libm::sqrtf(x * x + y * y);
+        let noise = HEIGHT_NOISE_PX * camera_height_m * range / (view.pair.focal_px * view.pair.baseline_m);
+        let rough = surface.rms_m > self.settings.mixed_rms_m + noise;
+        match surface.class {
+            SurfaceClass::Obstacle => Role::Obstacle,
+            SurfaceClass::Ground if rough => Role::Mixed,
+            SurfaceClass::Ground => Role::Ground,
+            _ => Role::Other,
+        }
+    }
+
     /// What the votes make of a cell.
     fn decide<const DISPARITIES: usize>(
         &self,
         index: usize,
         picture: DisparityPicture<'_>,
         view: &View<'_, DISPARITIES>,
-        ground: &GroundPlane,
+        ground: &Terrain,
         ground_seen: bool,
     ) -> Cell {
         let geometry = self.settings.geometry;
@@ -188,7 +207,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         // Pixels that a metre takes at this distance, across and, foreshortened, along the ground.
         let per_m = view.pair.focal_px / seen.distance_m;
         let across = geometry.cell_size_m() * per_m;
-        let along = across * (ground.camera_height_m / seen.distance_m).min(1.0);
+        let along = across * (ground.plane().camera_height_m / seen.distance_m).min(1.0);
         let obstacle_area = across * self.obstacle_heights_m.0 * per_m;
         let need_obstacle =
             (self.settings.obstacle_cover * obstacle_area).max(f32::from(self.settings.obstacle_min_pixels));
@@ -233,10 +252,12 @@ impl Sight {
         x: f32,
         y: f32,
         view: &View<'_, DISPARITIES>,
-        ground: &GroundPlane,
+        ground: &Terrain,
     ) -> Option<Self> {
-        let [nx, ny, nz] = ground.normal;
-        let z = if nz.abs() > 1.0e-3 { (ground.offset_m - nx * x - ny * y) / nz } else { 0.0 };
+        let plane = ground.plane();
+        let [nx, ny, nz] = plane.normal;
+        let level = plane.offset_m + ground.lift_m(x);
+        let z = if nz.abs() > 1.0e-3 { (level - nx * x - ny * y) / nz } else { 0.0 };
         let origin = view.rays.origin_m;
         let [right, down, distance_m] = view.frame.to_camera([x - origin[0], y - origin[1], z - origin[2]]);
         if distance_m <= 0.0 {

@@ -20,6 +20,9 @@ pub struct MapSettings {
     pub free_min_pixels: u16,
     /// Pixels above this height speak against a free cell, metres.
     pub free_max_height_m: f32,
+    /// Ground that lies off its plane by more than this, root mean square, metres, holds something that stands on it: its
+    /// pixels are told by their own height.
+    pub mixed_rms_m: f32,
     /// Cells farther away are not told, metres.
     pub max_range_m: f32,
 }
@@ -33,6 +36,7 @@ impl MapSettings {
         free_cover: 0.0,
         free_min_pixels: 0,
         free_max_height_m: 0.0,
+        mixed_rms_m: 0.0,
         max_range_m: 0.0,
     };
 
@@ -57,6 +61,7 @@ impl MapSettings {
         ConfigError::check("map.free_cover", self.free_cover, 0.0, 1.0)?;
         ConfigError::check("map.free_min_pixels", f32::from(self.free_min_pixels), 1.0, 10_000.0)?;
         ConfigError::check("map.free_max_height_m", self.free_max_height_m, 0.01, 2.0)?;
+        ConfigError::check("map.mixed_rms_m", self.mixed_rms_m, 0.0, 2.0)?;
         ConfigError::check("map.max_range_m", self.max_range_m, 0.1, 1000.0)
     }
 }
@@ -70,6 +75,7 @@ impl Default for MapSettings {
             free_cover: 0.1,
             free_min_pixels: 4,
             free_max_height_m: 0.2,
+            mixed_rms_m: 0.03,
             max_range_m: 30.0,
         }
     }

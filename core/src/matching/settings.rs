@@ -83,7 +83,7 @@ impl MatchSettings {
         range("matching.disparities", self.disparities, 8, 1024)?;
         range("matching.min_disparity", self.min_disparity, 0, 1000)?;
         range("matching.window", self.window, Self::MIN_WINDOW, Self::MAX_WINDOW)?;
-        if self.window % 2 == 0 {
+        if self.window.is_multiple_of(2) {
             return Err(ConfigError::new("matching.window", ConfigProblem::NotOdd));
         }
         range("matching.texture", self.texture, 0, 1000)?;

@@ -9,7 +9,7 @@ use heapless::Vec;
 use crate::{
     disparity::DisparityPicture,
     error::ConfigError,
-    ground::GroundPlane,
+    ground::Terrain,
     planes::{Scatter, SymmetricMatrix3},
     surfaces::{Regions, Surface, SurfaceClass, Surfaces},
 };
@@ -50,7 +50,7 @@ const HALF_LENGTH: f32 = 1.732_050_8;
 /// Joins surfaces that stand up from the ground into obstacles.
 ///
 /// Source: the paper, section 4.4. A surface takes part if it is near-vertical. What is neither vertical nor horizontal takes
-/// part if its middle lies above the least height of an obstacle, and what is horizontal if it lies so high that it is a bonnet
+/// part if it reaches the least height of an obstacle, and what is horizontal if it lies so high that it is a bonnet
 /// or a table top rather than a lawn behind a kerb.
 ///
 /// # Bound
@@ -87,7 +87,7 @@ impl ObstacleFinder {
         surfaces: &mut Surfaces<PIXELS, SURFACES>,
         regions: &mut Regions<SURFACES>,
         picture: DisparityPicture<'_>,
-        ground: &GroundPlane,
+        ground: &Terrain,
         obstacles: &mut Vec<Obstacle, OBSTACLES, u16>,
     ) -> u32 {
         obstacles.clear();
@@ -112,19 +112,20 @@ impl ObstacleFinder {
         dropped
     }
 
-    fn stands_up(&self, surface: &Surface, ground: &GroundPlane) -> bool {
+    fn stands_up(&self, surface: &Surface, ground: &Terrain) -> bool {
         match surface.class {
             SurfaceClass::Vertical | SurfaceClass::Obstacle => true,
             SurfaceClass::Ground => false,
             SurfaceClass::Horizontal => ground.height_m(surface.points.mean_m) >= self.settings.platform_height_m,
             SurfaceClass::Slanted | SurfaceClass::Undefined => {
-                ground.height_m(surface.points.mean_m) >= self.settings.min_height_m
+                let half = HALF_LENGTH * libm::sqrtf(surface.points.variance_along(ground.plane().normal));
+                ground.height_m(surface.points.mean_m) + half >= self.settings.min_height_m
             }
         }
     }
 
     /// The obstacle that the surfaces make, if they pass the thresholds.
-    fn measure<'a>(&self, members: impl Iterator<Item = &'a Surface>, ground: &GroundPlane) -> Option<Obstacle> {
+    fn measure<'a>(&self, members: impl Iterator<Item = &'a Surface>, ground: &Terrain) -> Option<Obstacle> {
         let mut all = Scatter::default();
         let mut count = 0u16;
         let (mut min_m, mut max_m) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
@@ -134,7 +135,7 @@ impl ObstacleFinder {
             count = count.saturating_add(1);
             let height = ground.height_m(points.mean_m);
             let middle = [points.mean_m[0], points.mean_m[1], height];
-            let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], ground.normal];
+            let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], ground.plane().normal];
             for i in 0..3 {
                 let half = HALF_LENGTH * libm::sqrtf(points.variance_along(axes[i]));
                 min_m[i] = min_m[i].min(middle[i] - half);

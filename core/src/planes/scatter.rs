@@ -59,3 +59,7 @@ impl Scatter {
             .max(0.0)
     }
 }
+
+#[cfg(test)]
+#[path = "scatter_tests.rs"]
+mod tests;

@@ -38,13 +38,13 @@ impl CameraMap {
         let raw = CameraModel {
             width: 0,
             height: 0,
-            fx: 1.0,
-            fy: 1.0,
+            fx: 0.0,
+            fy: 0.0,
             cx: 0.0,
             cy: 0.0,
             distortion: crate::geometry::Distortion([0.0; 8]),
         };
-        Self { raw, lens: Lens::ideal(), rotation: IDENTITY, focal_px: 1.0, cx: 0.0, cy: 0.0 }
+        Self { raw, lens: Lens::ideal(), rotation: [[0.0; 3]; 3], focal_px: 0.0, cx: 0.0, cy: 0.0 }
     }
 
     /// Both maps of a pair.
@@ -271,8 +271,6 @@ fn shortest_rotation_to_x([x, y, z]: [f32; 3]) -> Matrix {
     // The quaternion of twice the half-way turn is (1 + a.b, a x b).
     from_quaternion([1.0 + x, 0.0, z, -y])
 }
-
-const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 fn transposed(m: &Matrix) -> Matrix {
     let [a, b, c] = *m;

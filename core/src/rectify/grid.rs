@@ -58,7 +58,8 @@ pub(super) struct Segment {
 impl<const NODES: usize> Grid<NODES> {
     pub(super) const fn new() -> Self {
         let plane = Plane { origin: [0; 2], along_row: [0; 2], along_column: [0; 2] };
-        Self { nodes: [NOWHERE; NODES], columns: 0, plane }
+        // Zeros, so that a detector in a `static` takes no room in the image of the program; no node is read before `fill`.
+        Self { nodes: [[0; 2]; NODES], columns: 0, plane }
     }
 
     /// Samples the map for a rectified picture of `width x height`; the caller has seen that the nodes suffice.

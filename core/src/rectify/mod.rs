@@ -41,8 +41,9 @@ pub const fn grid_nodes(width: usize, height: usize) -> usize {
 #[derive(Clone, Debug)]
 pub struct Rectifier<const GRID: usize> {
     pair: RectifiedPair,
-    /// Whether the pictures arrive rectified.
-    pass_through: bool,
+    /// Whether there is something to do: not for pictures that arrive rectified. False at first, so that a rectifier that is
+    /// not configured is all zero.
+    remaps: bool,
     left: Camera<GRID>,
     right: Camera<GRID>,
 }
@@ -65,7 +66,7 @@ impl<const GRID: usize> Rectifier<GRID> {
             baseline_m: 0.0,
             disparity_offset_px: 0.0,
         };
-        Self { pair, pass_through: true, left: Camera::new(), right: Camera::new() }
+        Self { pair, remaps: false, left: Camera::new(), right: Camera::new() }
     }
 
     /// Takes a calibration and returns the rectified pair that the rows belong to.
@@ -84,7 +85,7 @@ impl<const GRID: usize> Rectifier<GRID> {
             StereoCalibration::Rectified(pair) => {
                 pair.check()?;
                 self.pair = *pair;
-                self.pass_through = true;
+                self.remaps = false;
             }
             StereoCalibration::Raw(raw) => {
                 let (pair, [left, right]) = CameraMap::pair(raw)?;
@@ -97,7 +98,7 @@ impl<const GRID: usize> Rectifier<GRID> {
                 self.left.fill(left, width, height);
                 self.right.fill(right, width, height);
                 self.pair = pair;
-                self.pass_through = false;
+                self.remaps = true;
             }
         }
         Ok(self.pair)
@@ -110,7 +111,7 @@ impl<const GRID: usize> Rectifier<GRID> {
 
     /// The rotation from the raw camera's frame into the rectified one, row by row; none for pairs that arrive rectified.
     pub const fn rotation(&self, side: Side) -> Option<&[[f32; 3]; 3]> {
-        if self.pass_through { None } else { Some(self.camera(side).map.rotation()) }
+        if self.remaps { Some(self.camera(side).map.rotation()) } else { None }
     }
 
     /// Writes row `y` of the rectified picture to `out` and returns its valid columns: the longest run of pixels whose
@@ -129,7 +130,7 @@ impl<const GRID: usize> Rectifier<GRID> {
         if row.is_empty() {
             return 0..0;
         }
-        if !self.pass_through {
+        if self.remaps {
             let camera = self.camera(side);
             let source = Source::new(raw, camera.map.raw_size());
             return sample_row(camera.grid.segments(y), &source, row);
@@ -146,7 +147,7 @@ impl<const GRID: usize> Rectifier<GRID> {
     /// Where the raw picture shows what belongs at `(u, v)` of the rectified one, px, by the full model in f32. The place
     /// may lie outside of the picture; `None` where the lens model folds back or the ray points backwards.
     pub fn source_of(&self, side: Side, u: f32, v: f32) -> Option<(f32, f32)> {
-        if self.pass_through {
+        if !self.remaps {
             return Some((u, v));
         }
         self.camera(side).map.source(u, v).map(|[x, y]| (x, y))

@@ -48,6 +48,8 @@ pub struct Surface {
     pub points: Scatter,
     /// Unit normal in the vehicle frame, upward; zero where no plane fits.
     pub normal: [f32; 3],
+    /// Root mean square distance of the points from the plane, metres.
+    pub rms_m: f32,
     /// What it is taken for.
     pub class: SurfaceClass,
 }
@@ -151,10 +153,8 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         let pixels = picture.pixels();
         let mut found = 0;
         for tile in Tile::all(self.width, self.height) {
-            let SurfaceSettings { step_sixteenths, min_pixels, .. } = self.settings;
             let covers = |steps| depth.inverse(steps) != 0;
-            let labels = &mut self.labels[..];
-            found += u32::from(self.union.label(pixels, self.width, tile, step_sixteenths, min_pixels, covers, labels));
+            found += u32::from(self.union.label(pixels, self.width, tile, &self.settings, covers, &mut self.labels));
         }
         let mut keep = KeepRule::everything();
         if found as usize > SURFACES {
@@ -310,10 +310,10 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
 
     /// Fits the plane and tells horizontal from vertical.
     fn classify(&self, points: Scatter) -> Surface {
-        let Some((normal, _)) = points.plane() else {
-            return Surface { points, normal: [0.0; 3], class: SurfaceClass::Undefined };
+        let Some((normal, variance)) = points.plane() else {
+            return Surface { points, class: SurfaceClass::Undefined, ..Surface::default() };
         };
-        let mut surface = Surface { points, normal, class: SurfaceClass::Slanted };
+        let mut surface = Surface { points, normal, rms_m: libm::sqrtf(variance), class: SurfaceClass::Slanted };
         let dot = surface.dot();
         if dot >= libm::cosf(self.settings.horizontal_deg.to_radians()) {
             surface.class = SurfaceClass::Horizontal;

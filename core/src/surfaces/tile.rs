@@ -1,6 +1,6 @@
 //! Contiguous surfaces inside one tile.
 
-use super::TILE;
+use super::{SurfaceSettings, TILE};
 use crate::disparity::DisparityPixel;
 
 /// Pixels of a tile.
@@ -47,7 +47,8 @@ impl TileUnion {
     }
 
     /// Numbers the surfaces of a tile from 1 in the order of their first pixels and writes the numbers to `labels`, 0 where
-    /// there is none; returns how many there are. `covers` says which disparities are points.
+    /// there is none; returns how many there are. `covers` says which disparities are points. Of the settings the step and
+    /// the least number of pixels count here.
     ///
     /// # Bound
     /// Three passes over the tile.
@@ -56,11 +57,11 @@ impl TileUnion {
         picture: &[DisparityPixel],
         stride: usize,
         tile: Tile,
-        step: u16,
-        min_pixels: u16,
+        settings: &SurfaceSettings,
         covers: impl Fn(u16) -> bool,
         labels: &mut [u8],
     ) -> u8 {
+        let SurfaceSettings { step_sixteenths: step, min_pixels, .. } = *settings;
         let row = |y: usize| &picture[(tile.y + y) * stride + tile.x..][..tile.width];
         let steps_of =
             |pixel: &DisparityPixel| Some(pixel.steps()).filter(|&steps| steps != 0 && covers(steps)).unwrap_or(0);

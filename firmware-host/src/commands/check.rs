@@ -310,6 +310,7 @@ fn describe_resolution(text: &mut String, pair: &RectifiedPair, settings: &Setti
 fn length(metres: f32) -> String {
     match metres {
         m if !m.is_finite() => "no end".to_string(),
+        m if m < 0.01 => format!("{:.1} mm", 1000.0 * m),
         m if m < 0.1 => format!("{:.1} cm", 100.0 * m),
         m => format!("{m:.2} m"),
     }

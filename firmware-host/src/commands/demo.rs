@@ -1,6 +1,10 @@
 //! `demo`: what the program does, without a camera or a recording.
 
-use fencepost_hal::scene::{Scene, SceneOptions};
+use fencepost_hal::{
+    camera::{Camera, StereoPair},
+    recording::RecordingWriter,
+    scene::{Scene, SceneCamera, SceneOptions},
+};
 
 use super::{Ending, detect_and_write};
 use crate::{
@@ -8,7 +12,7 @@ use crate::{
     config::Config,
     console::Console,
     error::Failure,
-    source::Input,
+    source::{Input, Source},
 };
 
 /// Renders a made-up scene and detects obstacles in it.
@@ -19,17 +23,53 @@ pub fn demo(args: &DemoArgs, console: &mut Console) -> Result<Ending, Failure> {
     let config = Config::load(&args.detector)?;
     let options = SceneOptions { frames: args.frames, ..SceneOptions::default() };
     let scene = Scene::new(options).map_err(|error| Failure::config(error, None))?;
+    let (calibration, mount) = (scene.calibration(), scene.mount());
+    let writer = match &args.record {
+        Some(folder) => Some(RecordingWriter::create(folder, &calibration, &mount)?),
+        None => None,
+    };
     let mut input = Input {
         name: "Demo scene".to_string(),
         description: format!(
             "a rendered trail with trees, bushes, rocks, a fence and a wall; {} × {} px, {} frames",
             options.width, options.height, options.frames
         ),
-        calibration: scene.calibration(),
-        mount: scene.mount(),
+        calibration,
+        mount,
         frames: options.frames as usize,
         warnings: Vec::new(),
-        source: scene.into_camera(),
+        source: Recorder { camera: scene.into_camera(), writer },
     };
-    detect_and_write(&mut input, &config, (&args.out, &Output::ALL), console, "demo")
+    let ending = detect_and_write(&mut input, &config, (&args.out, &Output::ALL), console, "demo")?;
+    if let Some(folder) = &args.record {
+        console.result(format_args!("recording   {}", folder.display()));
+    }
+    Ok(ending)
+}
+
+/// Hands the rendered pairs on, and writes them down where that is wanted.
+#[derive(Debug)]
+struct Recorder {
+    camera: SceneCamera,
+    writer: Option<RecordingWriter>,
+}
+
+impl Camera for Recorder {
+    type Error = Failure;
+
+    fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, Failure> {
+        let Self { camera, writer } = self;
+        let Ok(pair) = camera.next_pair(|pair| {
+            let written = writer.as_mut().map_or(Ok(()), |writer| writer.write_pair(pair).map(|_| ()));
+            written.map(|()| consume(pair))
+        });
+        pair.transpose().map_err(Failure::from)
+    }
+}
+
+impl Source for Recorder {
+    /// A rendered frame never fails, so that nobody needs to know which one it would have been.
+    fn upcoming(&self) -> Option<(u32, u64)> {
+        None
+    }
 }

@@ -19,8 +19,8 @@ use crate::{
     console::Console,
     error::{Failure, FailureKind},
     output::OutputFolder,
+    pipeline::{self, Job},
     report::PageInput,
-    session::{self, Job},
     source::{Input, Source},
     summary,
 };
@@ -63,7 +63,7 @@ fn detect_and_write<S: Source>(
     let settings = config.settings_for(input.picture_size().0);
     let job = Job { folder: &folder, write, settings, wire: config.wire, config };
     console.note(format_args!("{}: {} frames, {}", input.name, input.frames, input.description));
-    let (log, report) = session::run(input, &job, console, progress)?;
+    let (log, report) = pipeline::run(input, &job, console, progress)?;
 
     let summary = summary::summary(input, &job, &log, console.warnings());
     let mut text = serde_json::to_string_pretty(&summary)
@@ -83,7 +83,7 @@ fn detect_and_write<S: Source>(
         folder.write("report.html", page.as_bytes())?;
     }
     console.result(summary::table(&log));
-    console.result(format_args!("\nwritten to  {} in {}", out.display(), session::seconds(start.elapsed())));
+    console.result(format_args!("\nwritten to  {} in {}", out.display(), pipeline::seconds(start.elapsed())));
     if write.contains(&Output::Report) {
         console.result(format_args!("report      {}", out.join("report.html").display()));
     }

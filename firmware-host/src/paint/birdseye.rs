@@ -173,19 +173,17 @@ fn paint_field_of_view(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>)
     }
 }
 
-/// A stroke through the middle of each obstacle along its largest extent, as far as its box reaches.
+/// A stroke through the middle of each obstacle along its largest extent, as far as its cells reach.
 fn paint_obstacles(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
-    let frame = scale.frame();
     for obstacle in &view.detection.obstacles {
         let (sin, cos) = obstacle.orientation_rad.sin_cos();
         let half_m = obstacle.length_m.clamp(0.1, 50.0) / 2.0;
         let [x, y, _] = obstacle.mean_m;
         let ends = [-half_m, half_m].map(|along| scale.point(x + cos * along, y + sin * along));
-        let [near, far] = [obstacle.min_m, obstacle.max_m].map(|corner| scale.point(corner[0], corner[1]));
-        let extent = Rectangle::with_corners(near, far);
         for point in Line::new(ends[0], ends[1]).points() {
-            if frame.contains(point) && extent.contains(point) {
-                canvas.blend(point.x, point.y, INK, 0.85);
+            let (Ok(column), Ok(row)) = (usize::try_from(point.x), usize::try_from(point.y)) else { continue };
+            if [OBSTACLE, DOT].contains(&canvas.get(column, row)) {
+                canvas.set(point.x, point.y, INK);
             }
         }
     }

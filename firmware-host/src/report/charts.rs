@@ -118,10 +118,11 @@ fn padded(values: impl Iterator<Item = f64>, least_span: f64, from_zero: bool) -
 }
 
 fn short(value: &f64) -> String {
-    // No "-0".
-    let value = if value.abs() < 1.0e-9 { 0.0 } else { *value };
     let text = format!("{value:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_string()
+    match text.trim_end_matches('0').trim_end_matches('.') {
+        "-0" => "0".to_string(),
+        text => text.to_string(),
+    }
 }
 
 /// Replaces the stand-in colours by classes of the style sheet.
@@ -144,6 +145,15 @@ mod tests {
             expected: Some(1.3),
             least_span: 0.2,
             from_zero: false,
+        }
+    }
+
+    #[test]
+    fn labels_have_no_digits_to_spare() {
+        for (value, text) in
+            [(0.0, "0"), (-1.0e-9, "0"), (1.5, "1.5"), (200.0, "200"), (-0.25, "-0.25"), (0.1 + 0.2, "0.3")]
+        {
+            assert_eq!(short(&value), text);
         }
     }
 

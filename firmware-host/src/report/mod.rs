@@ -3,6 +3,7 @@
 mod charts;
 mod frames;
 mod page;
+mod tables;
 
 pub use frames::ReportFrame;
 pub use page::PageInput;

@@ -26,6 +26,7 @@ use crate::{
     source::{Input, Source},
     stopwatch::{FrameTimes, Stopwatch, milliseconds},
     view::FrameView,
+    words,
 };
 
 /// Everything a run needs besides its pictures.
@@ -100,18 +101,18 @@ pub fn run<S: Source>(
     detector
         .configure(&job.settings, &input.calibration, &input.mount)
         .map_err(|error| Failure::config(error, job.config.file.as_deref()))?;
-    let mut session = Session::start(job, &detector, input.frames)?;
+    let mut pipeline = Pipeline::start(job, &detector, input.frames)?;
     console.start_progress(input.frames, progress);
-    let result = session.play(input, &mut detector, console);
+    let result = pipeline.play(input, &mut detector, console);
     console.end_progress();
     // Whatever happened, the bus is told that the node stops, and what was found so far is handed on.
-    let Session { can, mut log, report, .. } = session;
+    let Pipeline { can, mut log, report, .. } = pipeline;
     log.can = can.finish()?;
     result?;
     Ok((log, report))
 }
 
-struct Session<'a> {
+struct Pipeline<'a> {
     job: &'a Job<'a>,
     tables: Option<Tables>,
     can: CanLog,
@@ -121,7 +122,7 @@ struct Session<'a> {
     left: Vec<u8>,
 }
 
-impl<'a> Session<'a> {
+impl<'a> Pipeline<'a> {
     fn start(job: &'a Job<'a>, detector: &ProgramDetector, frames: usize) -> Result<Self, Failure> {
         let config = WireConfig::new(job.wire).map_err(|e| Failure::config(e, job.config.file.as_deref()))?;
         let folder = job.folder;
@@ -289,8 +290,12 @@ fn not_looked_at(error: DetectError, number: u32) -> Failure {
     }
 }
 
-/// Says what makes a frame less than true: each reason for its first frames, the rest are counted.
+/// Says how a frame went, to who asked for it, and what makes it less than true: each reason for its first frames, the rest are counted.
 fn say_health(console: &mut Console, record: Option<&FrameRecord>, health: Health) {
+    if let Some(FrameRecord { number, times, obstacles, .. }) = record {
+        let level = words::level_name(health.level);
+        console.note(format_args!("frame {number}: {obstacles} obstacles, health {level}, {:.1} ms", times.total_ms));
+    }
     if health.level == HealthLevel::Ok {
         return;
     }

@@ -1,4 +1,4 @@
-//! What the detector says about itself.
+//! Levels and reasons.
 
 /// How far the cells can be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

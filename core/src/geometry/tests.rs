@@ -1,0 +1,187 @@
+//! Frames by hand-made examples and against matrices in f64.
+
+use std::boxed::Box;
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use super::*;
+use crate::{
+    error::{ConfigError, ConfigProblem},
+    test_random::Random,
+    test_world::{self, World},
+};
+
+fn frame(height_m: f32, pitch_down_deg: f32, roll_deg: f32) -> VehicleFrame {
+    VehicleFrame::new(&Mount { height_m: Some(height_m), pitch_down_deg, roll_deg }).unwrap()
+}
+
+#[track_caller]
+fn near(found: [f32; 3], expected: [f32; 3]) {
+    let apart = (0..3).map(|i| (found[i] - expected[i]).abs()).fold(0.0, f32::max);
+    assert!(apart < 1.0e-5, "{found:?} instead of {expected:?}");
+}
+
+#[test]
+fn a_level_camera_looks_along_x() {
+    let frame = frame(1.5, 0.0, 0.0);
+    near(frame.point([0.0, 0.0, 4.0]), [4.0, 0.0, 1.5]);
+    near(frame.point([1.0, 0.0, 4.0]), [4.0, -1.0, 1.5]);
+    near(frame.point([0.0, 1.0, 4.0]), [4.0, 0.0, 0.5]);
+    near(frame.to_camera([1.0, 0.0, 0.0]), [0.0, 0.0, 1.0]);
+}
+
+#[test]
+fn a_camera_tilted_down_sees_the_ground_ahead() {
+    // 45 degrees from 2 m: the optical axis meets the ground 2 m ahead.
+    let frame = frame(2.0, 45.0, 0.0);
+    near(frame.point([0.0, 0.0, 8.0_f32.sqrt()]), [2.0, 0.0, 0.0]);
+    // Straight to the right stays level.
+    near(frame.direction([1.0, 0.0, 0.0]), [0.0, -1.0, 0.0]);
+}
+
+#[test]
+fn a_camera_that_leans_to_the_right_has_its_right_side_low() {
+    let frame = frame(1.0, 0.0, 30.0);
+    near(frame.direction([1.0, 0.0, 0.0]), [0.0, -(30.0_f32.to_radians().cos()), -0.5]);
+    near(frame.direction([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn a_mount_without_a_height_stands_at_the_assumed_one() {
+    let mount = Mount::default();
+    assert_eq!(VehicleFrame::new(&mount).unwrap().camera_height_m(), Mount::ASSUMED_HEIGHT_M);
+}
+
+#[test]
+fn frames_are_those_of_rotations_about_the_vehicles_axes() {
+    let mut random = Random::seeded("frames", 0x5eed_0120);
+    for _ in 0..5000 {
+        let world = World::empty(random.within(0.1, 5.0), random.within(-60.0, 89.0), random.within(-60.0, 60.0));
+        let frame = world.frame();
+        let camera = Vector3::from_fn(|_, _| random.within(-10.0, 10.0));
+        let truth = world.rotation() * camera + Vector3::new(0.0, 0.0, world.height_m);
+        let found = Vector3::from(frame.point(camera.map(|c| c as f32).into()).map(f64::from));
+        assert!((found - truth).norm() < 2.0e-5, "{found} instead of {truth}, {world:?}");
+        let back = frame.to_camera(frame.direction(camera.map(|c| c as f32).into()));
+        assert!((Vector3::from(back.map(f64::from)) - camera).norm() < 2.0e-5);
+
+        // A camera turned against the mounted one: the same thing seen by both lies at the same place.
+        let turn =
+            Rotation3::from_euler_angles(random.within(-0.3, 0.3), random.within(-0.3, 0.3), random.within(-0.3, 0.3));
+        let rotation: [[f32; 3]; 3] = core::array::from_fn(|i| core::array::from_fn(|j| turn[(i, j)] as f32));
+        let found = frame.turned(&rotation).point((turn * camera).map(|c| c as f32).into());
+        assert!((Vector3::from(found.map(f64::from)) - truth).norm() < 5.0e-5);
+    }
+}
+
+#[test]
+fn rays_are_the_projection_turned_round() {
+    let mut random = Random::seeded("rays", 0x5eed_0121);
+    for _ in 0..2000 {
+        let mut world = World::empty(random.within(0.1, 3.0), random.within(-30.0, 60.0), random.within(-30.0, 30.0));
+        world.pair = RectifiedPair {
+            focal_px: random.within(50.0, 2000.0) as f32,
+            cx: random.within(0.0, 1000.0) as f32,
+            cy: random.within(0.0, 1000.0) as f32,
+            ..test_world::PAIR
+        };
+        let (u, v, z) = (random.within(0.0, 1000.0), random.within(0.0, 1000.0), random.within(0.5, 50.0));
+        let truth = Vector3::new(0.0, 0.0, world.height_m) + world.direction(u, v) * z;
+        let found = Vector3::from(world.rays().point_m(u as f32, v as f32, z as f32).map(f64::from));
+        assert!((found - truth).norm() < 2.0e-5 * (truth.norm() + 1.0), "{found} instead of {truth}");
+        // And forth again, through the pinhole.
+        let seen = world.frame().to_camera([found.x as f32, found.y as f32, found.z as f32 - world.height_m as f32]);
+        let pixel = world.pair.cx + world.pair.focal_px * seen[0] / seen[2];
+        assert!((f64::from(pixel) - u).abs() < 0.02, "{pixel} instead of {u}");
+    }
+    assert_eq!(Rays::UNSET, Rays::default());
+}
+
+#[test]
+fn distances_are_those_of_the_formula_for_every_step() {
+    let mut random = Random::seeded("distances", 0x5eed_0122);
+    let mut table = Box::new(DepthTable::<128>::new());
+    assert!((0..=u16::MAX).all(|steps| table.inverse(steps) == 0), "an empty table has no distance");
+    for round in 0..40 {
+        let pair = RectifiedPair {
+            focal_px: random.within(50.0, 3000.0) as f32,
+            baseline_m: random.within(0.02, 2.0) as f32,
+            disparity_offset_px: if round % 2 == 0 { 0.0 } else { random.within(-40.0, 40.0) as f32 },
+            ..test_world::PAIR
+        };
+        let (min_disparity, disparities) = (random.below(100) as u16, 8 + random.below(121) as u16);
+        table.configure(&pair, min_disparity, disparities);
+        let scale = f64::from(pair.focal_px) * f64::from(pair.baseline_m);
+        for steps in 0..=u16::MAX {
+            let disparity = f64::from(steps) / 16.0 + f64::from(pair.disparity_offset_px);
+            let in_range = steps >= min_disparity * 16 && steps < (min_disparity + disparities) * 16;
+            let found = f64::from(table.distance_m(steps));
+            // At the very end of what meets the rounding of the offset decides.
+            if (disparity - 1.0 / 16.0).abs() < 1.0e-4 {
+                continue;
+            }
+            if !in_range || disparity < 1.0 / 16.0 {
+                assert_eq!((table.inverse(steps), found), (0, 0.0), "{steps}, {pair:?}");
+                continue;
+            }
+            let truth = scale / disparity;
+            // Half a unit of the inverse.
+            let tolerance = f64::from(table.scale_m()) * 0.5 + truth * 2.0e-5;
+            assert!((found - truth).abs() <= tolerance, "{steps}: {found} instead of {truth}, {pair:?}");
+        }
+    }
+}
+
+#[test]
+fn distance_and_disparity_are_inverse() {
+    let pair = RectifiedPair { disparity_offset_px: 3.5, ..test_world::PAIR };
+    for tenths in 1..1000_u16 {
+        let distance = f32::from(tenths) * 0.1;
+        assert!(
+            (pair.distance_m(pair.disparity_px(distance)) - distance).abs() < 1.0e-3 * distance * distance.max(1.0)
+        );
+    }
+    assert_eq!(pair.distance_m(-3.5), f32::INFINITY);
+    assert_eq!(pair.distance_m(-10.0), f32::INFINITY);
+}
+
+#[test]
+fn what_cannot_be_is_named() {
+    let problem = |pair: RectifiedPair| pair.check().unwrap_err();
+    let nan = ConfigProblem::NotFinite;
+    let good = test_world::PAIR;
+    assert_eq!(good.check(), Ok(()));
+    assert_eq!(problem(RectifiedPair { focal_px: f32::NAN, ..good }), ConfigError::new("calibration.focal_px", nan));
+    assert_eq!(problem(RectifiedPair { cx: f32::INFINITY, ..good }), ConfigError::new("calibration.cx", nan));
+    assert_eq!(problem(RectifiedPair { cy: f32::NAN, ..good }), ConfigError::new("calibration.cy", nan));
+    assert_eq!(problem(RectifiedPair { width: 0, ..good }).field, "calibration.width");
+    assert_eq!(problem(RectifiedPair { height: u32::MAX, ..good }).field, "calibration.height");
+    assert_eq!(problem(RectifiedPair { focal_px: 0.0, ..good }).field, "calibration.focal_px");
+    assert_eq!(problem(RectifiedPair { focal_px: -500.0, ..good }).field, "calibration.focal_px");
+    assert_eq!(problem(RectifiedPair { baseline_m: 0.0, ..good }).field, "calibration.baseline_m");
+    assert_eq!(
+        problem(RectifiedPair { baseline_m: f32::NAN, ..good }),
+        ConfigError::new("calibration.baseline_m", nan)
+    );
+    let exchanged = problem(RectifiedPair { baseline_m: -0.2, ..good });
+    assert_eq!(exchanged, ConfigError::new("calibration.baseline_m", ConfigProblem::Exchanged));
+    assert_eq!(problem(RectifiedPair { disparity_offset_px: 1.0e6, ..good }).field, "calibration.disparity_offset_px");
+
+    let mount = |height_m, pitch_down_deg, roll_deg| {
+        VehicleFrame::new(&Mount { height_m, pitch_down_deg, roll_deg }).unwrap_err().field
+    };
+    assert_eq!(mount(Some(0.0), 0.0, 0.0), "mount.height_m");
+    assert_eq!(mount(Some(f32::NAN), 0.0, 0.0), "mount.height_m");
+    assert_eq!(mount(None, 90.0, 0.0), "mount.pitch_down_deg");
+    assert_eq!(mount(None, f32::NAN, 0.0), "mount.pitch_down_deg");
+    assert_eq!(mount(None, 0.0, -61.0), "mount.roll_deg");
+}
+
+#[test]
+fn frames_are_rotations() {
+    for (pitch, roll) in [(0.0, 0.0), (-60.0, 60.0), (89.0, -60.0), (33.0, 12.0)] {
+        let rows = Matrix3::from_fn(|i, j| f64::from(frame(1.0, pitch, roll).rows()[i][j]));
+        assert!((rows * rows.transpose() - Matrix3::identity()).amax() < 1.0e-6);
+        assert!((rows.determinant() - 1.0).abs() < 1.0e-6, "a mirror image");
+    }
+}
