@@ -66,7 +66,8 @@ def mistakes(log, cells):
     other = cells[1].replace("free", "FREE").replace("obstacle", "free").replace("FREE", "obstacle")
     yield "another state in the table", log, cells[:1] + [other] + cells[2:]
     yield "a place that is no centre of a cell", log, cells[:1] + [cells[1].replace(cells[1].split(",")[2], "0.2")] + cells[2:]
-    yield "a frame missing in the table", log, [line for line in cells if not line.startswith("7,")]
+    last = cells[-1].split(",")[0]
+    yield "a frame missing in the table", log, [line for line in cells if not line.startswith(f"{last},")]
     yield "a table without states", log, [line.replace("state", "condition") for line in cells[:1]] + cells[1:]
 
 
