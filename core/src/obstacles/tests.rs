@@ -106,6 +106,7 @@ fn every_threshold_counts() {
         clearance_m: 5.0,
         min_pixels: 0,
         min_size_m: 0.0,
+        max_range_m: 40.0,
     };
     let obstacles = find(&world, &loose);
     let [found] = obstacles[..] else { panic!("{obstacles:?}") };

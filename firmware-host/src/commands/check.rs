@@ -6,6 +6,7 @@ use std::{
 };
 
 use fencepost_core::{
+    detector::{Capacities, memory_bytes},
     geometry::{CameraModel, Mount, RectifiedPair, StereoCalibration},
     settings::Settings,
     wire::{WireConfig, max_bits_per_scan, max_frames_per_scan, max_load_permille},
@@ -225,11 +226,14 @@ fn describe_view(
     line(text, "mount", summary::mount_words(mount));
     describe_blind_zone(text, &pair, mount, &settings);
     describe_bus(text, config)?;
+    let fitting =
+        Capacities::for_pictures(pair.width as usize, pair.height as usize, usize::from(settings.matching.disparities));
     line(
         text,
         "memory",
         format_args!(
-            "{} in this program, built for {}",
+            "{} for a detector of just this size; this program holds {}, built for {}",
+            words::bytes(memory_bytes(&fitting)),
             words::bytes(size_of::<ProgramDetector>()),
             detector::capacity_in_words()
         ),

@@ -1,138 +1,34 @@
 //! The whole detector: one call from a pair of pictures to obstacle cells.
 
-use heapless::Vec;
+mod detection;
+mod memory;
+mod stage;
+
+pub use detection::{DetectError, Detection, Statistics};
+pub use memory::{Capacities, memory_bytes};
+pub use stage::{Probe, Stage};
 
 use crate::{
     disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
     geometry::{DepthTable, Mount, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
     ground::{GroundFinder, GroundPlane, Terrain},
-    health::{self, Exposure, Health, HealthLevel, HealthSettings, Signs},
-    map::{CellState, MapBuilder, ObstacleMap, SectorDistances, View},
+    health::{self, Exposure, HealthSettings, Signs},
+    map::{MapBuilder, SectorDistances, View},
     matching::{MatchSettings, Matcher, ValidSpan},
-    obstacles::{Obstacle, ObstacleFinder},
+    obstacles::ObstacleFinder,
     picture::Picture,
     rectify::{Rectifier, Side},
     settings::Settings,
-    surfaces::{Regions, Surface, SurfaceClass, SurfaceReport, Surfaces},
+    surfaces::{Regions, Surface, Surfaces},
     validate::SurfaceSize,
 };
-
-/// The stages, in the order in which they run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-#[expect(missing_docs, reason = "the names are those of the modules")]
-pub enum Stage {
-    Rectify = 0,
-    Match = 1,
-    Validate = 2,
-    Surfaces = 3,
-    Ground = 4,
-    Obstacles = 5,
-    Map = 6,
-    Health = 7,
-}
-
-impl Stage {
-    /// Every stage in order.
-    pub const ALL: [Self; 8] = [
-        Self::Rectify,
-        Self::Match,
-        Self::Validate,
-        Self::Surfaces,
-        Self::Ground,
-        Self::Obstacles,
-        Self::Map,
-        Self::Health,
-    ];
-
-    /// Name as it is written in summaries.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Rectify => "rectify",
-            Self::Match => "match",
-            Self::Validate => "validate",
-            Self::Surfaces => "surfaces",
-            Self::Ground => "ground",
-            Self::Obstacles => "obstacles",
-            Self::Map => "map",
-            Self::Health => "health",
-        }
-    }
-}
-
-/// Watches the stages go by. The core reads no clock: a program that wants times brings one here.
-///
-/// Rectification and matching take turns row by row, so `enter` is called up to twice for each row.
-pub trait Probe {
-    /// The work that follows belongs to `stage`.
-    fn enter(&mut self, stage: Stage);
-}
-
-/// Watches nothing.
-impl Probe for () {
-    fn enter(&mut self, _stage: Stage) {}
-}
 
 /// Rows that are matched the other way round when left and right may be exchanged.
 const EXCHANGE_ROWS: usize = 8;
 
 /// Share of their pixels that must match that way.
 const EXCHANGED_SHARE: f32 = 0.25;
-
-/// Counts that say how a frame went.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Statistics {
-    /// Pixels with a disparity.
-    pub pixels_with_disparity: u32,
-    /// Pixels without, by [`crate::disparity::Reason`].
-    pub pixels_without: [u32; 7],
-    /// Surfaces found in the tiles.
-    pub surfaces: u32,
-    /// Surfaces left out because the table was full.
-    pub surfaces_dropped: u32,
-    /// Surfaces within the horizontal limit.
-    pub surfaces_horizontal: u32,
-    /// Surfaces beyond the vertical limit.
-    pub surfaces_vertical: u32,
-    /// Obstacles left out because the table was full.
-    pub obstacles_dropped: u32,
-    /// Obstacle cells.
-    pub cells_obstacle: u32,
-    /// Free cells.
-    pub cells_free: u32,
-}
-
-/// All that one pair of pictures says.
-#[derive(Clone, Debug)]
-pub struct Detection<const OBSTACLES: usize, const CELLS: usize> {
-    /// Cells around the robot.
-    pub map: ObstacleMap<CELLS>,
-    /// Nearest obstacle by direction.
-    pub sectors: SectorDistances,
-    /// The ground, if it was seen or is still held.
-    pub ground: Option<GroundPlane>,
-    /// Obstacles, nearest first.
-    pub obstacles: Vec<Obstacle, OBSTACLES, u16>,
-    /// How far this can be trusted.
-    pub health: Health,
-    /// Counts.
-    pub statistics: Statistics,
-}
-
-/// Why a pair of pictures was not looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DetectError {
-    /// `configure` was not called, or failed.
-    NotConfigured,
-    /// A picture has another size than the calibration says.
-    WrongSize {
-        /// Width and height of the picture.
-        found: (usize, usize),
-        /// Width and height of the calibration.
-        expected: (usize, usize),
-    },
-}
 
 /// The detector: every stage and every buffer.
 ///
@@ -429,87 +325,6 @@ impl<
 {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-impl<const OBSTACLES: usize, const CELLS: usize> Detection<OBSTACLES, CELLS> {
-    /// Nothing seen.
-    pub const fn new() -> Self {
-        Self {
-            map: ObstacleMap::EMPTY,
-            sectors: SectorDistances::UNSET,
-            ground: None,
-            obstacles: Vec::new(),
-            health: Health { level: HealthLevel::Ok, reasons: 0 },
-            statistics: Statistics::NONE,
-        }
-    }
-
-    /// Forgets what was seen, without moving the tables.
-    fn clear(&mut self) {
-        self.map.cells.clear();
-        self.sectors = SectorDistances::default();
-        self.ground = None;
-        self.obstacles.clear();
-        self.health = Health::OK;
-        self.statistics = Statistics::NONE;
-    }
-}
-
-impl<const OBSTACLES: usize, const CELLS: usize> Default for Detection<OBSTACLES, CELLS> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Statistics {
-    const NONE: Self = Self {
-        pixels_with_disparity: 0,
-        pixels_without: [0; 7],
-        surfaces: 0,
-        surfaces_dropped: 0,
-        surfaces_horizontal: 0,
-        surfaces_vertical: 0,
-        obstacles_dropped: 0,
-        cells_obstacle: 0,
-        cells_free: 0,
-    };
-
-    /// Share of the pixels that have a disparity.
-    pub fn coverage(&self) -> f32 {
-        let without: u32 = self.pixels_without.iter().sum();
-        self.pixels_with_disparity as f32 / (self.pixels_with_disparity + without).max(1) as f32
-    }
-
-    fn count<const CELLS: usize>(
-        &mut self,
-        picture: DisparityPicture<'_>,
-        report: SurfaceReport,
-        surfaces: &[Surface],
-        map: &ObstacleMap<CELLS>,
-    ) {
-        for pixel in picture.pixels() {
-            match pixel.get() {
-                Ok(_) => self.pixels_with_disparity += 1,
-                Err(reason) => self.pixels_without[reason as usize] += 1,
-            }
-        }
-        self.surfaces = surfaces.len() as u32;
-        self.surfaces_dropped = report.dropped;
-        for surface in surfaces {
-            match surface.class {
-                SurfaceClass::Ground | SurfaceClass::Horizontal => self.surfaces_horizontal += 1,
-                SurfaceClass::Vertical | SurfaceClass::Obstacle => self.surfaces_vertical += 1,
-                SurfaceClass::Slanted | SurfaceClass::Undefined => {}
-            }
-        }
-        for cell in &map.cells {
-            match cell.state {
-                CellState::Obstacle => self.cells_obstacle += 1,
-                CellState::Free => self.cells_free += 1,
-                CellState::Unknown(_) => {}
-            }
-        }
     }
 }
 

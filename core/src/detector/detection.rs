@@ -1,0 +1,147 @@
+//! What one pair of pictures says.
+
+use heapless::Vec;
+
+use crate::{
+    disparity::DisparityPicture,
+    ground::GroundPlane,
+    health::{Health, HealthLevel},
+    map::{CellState, ObstacleMap, SectorDistances},
+    obstacles::Obstacle,
+    surfaces::{Surface, SurfaceClass, SurfaceReport},
+};
+
+/// Counts that say how a frame went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Pixels with a disparity.
+    pub pixels_with_disparity: u32,
+    /// Pixels without, by [`crate::disparity::Reason`].
+    pub pixels_without: [u32; 7],
+    /// Surfaces found in the tiles.
+    pub surfaces: u32,
+    /// Surfaces left out because the table was full.
+    pub surfaces_dropped: u32,
+    /// Surfaces within the horizontal limit.
+    pub surfaces_horizontal: u32,
+    /// Surfaces beyond the vertical limit.
+    pub surfaces_vertical: u32,
+    /// Obstacles left out because the table was full.
+    pub obstacles_dropped: u32,
+    /// Obstacle cells.
+    pub cells_obstacle: u32,
+    /// Free cells.
+    pub cells_free: u32,
+}
+
+/// All that one pair of pictures says.
+#[derive(Clone, Debug)]
+pub struct Detection<const OBSTACLES: usize, const CELLS: usize> {
+    /// Cells around the robot.
+    pub map: ObstacleMap<CELLS>,
+    /// Nearest obstacle by direction.
+    pub sectors: SectorDistances,
+    /// The ground, if it was seen or is still held.
+    pub ground: Option<GroundPlane>,
+    /// Obstacles, nearest first.
+    pub obstacles: Vec<Obstacle, OBSTACLES, u16>,
+    /// How far this can be trusted.
+    pub health: Health,
+    /// Counts.
+    pub statistics: Statistics,
+}
+
+/// Why a pair of pictures was not looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DetectError {
+    /// `configure` was not called, or failed.
+    NotConfigured,
+    /// A picture has another size than the calibration says.
+    WrongSize {
+        /// Width and height of the picture.
+        found: (usize, usize),
+        /// Width and height of the calibration.
+        expected: (usize, usize),
+    },
+}
+
+impl<const OBSTACLES: usize, const CELLS: usize> Detection<OBSTACLES, CELLS> {
+    /// Nothing seen.
+    pub const fn new() -> Self {
+        Self {
+            map: ObstacleMap::EMPTY,
+            sectors: SectorDistances::UNSET,
+            ground: None,
+            obstacles: Vec::new(),
+            health: Health { level: HealthLevel::Ok, reasons: 0 },
+            statistics: Statistics::NONE,
+        }
+    }
+
+    /// Forgets what was seen, without moving the tables.
+    pub(super) fn clear(&mut self) {
+        self.map.cells.clear();
+        self.sectors = SectorDistances::default();
+        self.ground = None;
+        self.obstacles.clear();
+        self.health = Health::OK;
+        self.statistics = Statistics::NONE;
+    }
+}
+
+impl<const OBSTACLES: usize, const CELLS: usize> Default for Detection<OBSTACLES, CELLS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Statistics {
+    const NONE: Self = Self {
+        pixels_with_disparity: 0,
+        pixels_without: [0; 7],
+        surfaces: 0,
+        surfaces_dropped: 0,
+        surfaces_horizontal: 0,
+        surfaces_vertical: 0,
+        obstacles_dropped: 0,
+        cells_obstacle: 0,
+        cells_free: 0,
+    };
+
+    /// Share of the pixels that have a disparity.
+    pub fn coverage(&self) -> f32 {
+        let without: u32 = self.pixels_without.iter().sum();
+        self.pixels_with_disparity as f32 / (self.pixels_with_disparity + without).max(1) as f32
+    }
+
+    pub(super) fn count<const CELLS: usize>(
+        &mut self,
+        picture: DisparityPicture<'_>,
+        report: SurfaceReport,
+        surfaces: &[Surface],
+        map: &ObstacleMap<CELLS>,
+    ) {
+        for pixel in picture.pixels() {
+            match pixel.get() {
+                Ok(_) => self.pixels_with_disparity += 1,
+                Err(reason) => self.pixels_without[reason as usize] += 1,
+            }
+        }
+        self.surfaces = surfaces.len() as u32;
+        self.surfaces_dropped = report.dropped;
+        for surface in surfaces {
+            match surface.class {
+                SurfaceClass::Ground | SurfaceClass::Horizontal => self.surfaces_horizontal += 1,
+                SurfaceClass::Vertical | SurfaceClass::Obstacle => self.surfaces_vertical += 1,
+                SurfaceClass::Slanted | SurfaceClass::Undefined => {}
+            }
+        }
+        for cell in &map.cells {
+            match cell.state {
+                CellState::Obstacle => self.cells_obstacle += 1,
+                CellState::Free => self.cells_free += 1,
+                CellState::Unknown(_) => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! How much memory a detector takes.
+
+use super::Detector;
+use crate::rectify::grid_nodes;
+
+/// What a detector is to hold; the const generics of [`Detector`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Capacities {
+    /// Pixels of a picture.
+    pub pixels: usize,
+    /// Width of a picture.
+    pub width: usize,
+    /// Disparities.
+    pub disparities: usize,
+    /// Nodes of the rectification map.
+    pub grid: usize,
+    /// Surfaces.
+    pub surfaces: usize,
+    /// Obstacles.
+    pub obstacles: usize,
+    /// Cells.
+    pub cells: usize,
+}
+
+impl Capacities {
+    /// Just enough for pictures of one size: five surfaces to a tile (a typical picture has three; where there are more, the
+    /// smallest are left out), 64 obstacles and 2500 cells.
+    pub const fn for_pictures(width: usize, height: usize, disparities: usize) -> Self {
+        let tiles = width.div_ceil(crate::surfaces::TILE) * height.div_ceil(crate::surfaces::TILE);
+        let grid = grid_nodes(width, height);
+        Self { pixels: width * height, width, disparities, grid, surfaces: 5 * tiles, obstacles: 64, cells: 2500 }
+    }
+}
+
+/// Bytes that a detector of these capacities takes, all of its state and tables; at most 64 bytes of padding more or less.
+///
+/// The size is a constant, and a term for each capacity and for width x disparities. Each term is the difference between two
+/// detectors that the compiler has laid out.
+pub const fn memory_bytes(capacities: &Capacities) -> usize {
+    const BASE: usize = size_of::<Detector<1024, 64, 16, 64, 64, 64, 64>>();
+    const PIXELS: usize = (size_of::<Detector<2048, 64, 16, 64, 64, 64, 64>>() - BASE) / 1024;
+    const GRID: usize = (size_of::<Detector<1024, 64, 16, 128, 64, 64, 64>>() - BASE) / 64;
+    const SURFACES: usize = (size_of::<Detector<1024, 64, 16, 64, 128, 64, 64>>() - BASE) / 64;
+    const OBSTACLES: usize = (size_of::<Detector<1024, 64, 16, 64, 64, 128, 64>>() - BASE) / 64;
+    const CELLS: usize = (size_of::<Detector<1024, 64, 16, 64, 64, 64, 128>>() - BASE) / 64;
+    // Width and disparities stand alone and as a product.
+    const BY_WIDTH: usize = size_of::<Detector<1024, 128, 16, 64, 64, 64, 64>>() - BASE;
+    const BY_DISPARITIES: usize = size_of::<Detector<1024, 64, 32, 64, 64, 64, 64>>() - BASE;
+    const BOTH: usize = size_of::<Detector<1024, 128, 32, 64, 64, 64, 64>>() - BASE;
+    const PRODUCT: usize = (BOTH - BY_WIDTH - BY_DISPARITIES) / (64 * 16);
+    const WIDTH: usize = BY_WIDTH / 64 - 16 * PRODUCT;
+    const DISPARITIES: usize = BY_DISPARITIES / 16 - 64 * PRODUCT;
+    const CONSTANT: usize = BASE
+        - (PIXELS * 1024
+            + 64 * (GRID + SURFACES + OBSTACLES + CELLS)
+            + WIDTH * 64
+            + DISPARITIES * 16
+            + PRODUCT * 64 * 16);
+    CONSTANT
+        + PIXELS * capacities.pixels
+        + WIDTH * capacities.width
+        + DISPARITIES * capacities.disparities
+        + PRODUCT * capacities.width * capacities.disparities
+        + GRID * capacities.grid
+        + SURFACES * capacities.surfaces
+        + OBSTACLES * capacities.obstacles
+        + CELLS * capacities.cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(found: usize, capacities: Capacities) {
+        let told = memory_bytes(&capacities);
+        assert!(found.abs_diff(told) <= 64, "{capacities:?}: {found} bytes, not {told}");
+    }
+
+    #[test]
+    fn tells_the_size_that_the_compiler_lays_out() {
+        const SMALL: Capacities = Capacities::for_pictures(320, 240, 48);
+        const LAGR: Capacities = Capacities::for_pictures(512, 384, 64);
+        const LARGE: Capacities = Capacities::for_pictures(1242, 375, 128);
+        check(size_of::<Detector<{ 320 * 240 }, 320, 48, { SMALL.grid }, { SMALL.surfaces }, 64, 2500>>(), SMALL);
+        check(size_of::<Detector<{ 512 * 384 }, 512, 64, { LAGR.grid }, { LAGR.surfaces }, 64, 2500>>(), LAGR);
+        check(size_of::<Detector<{ 1242 * 375 }, 1242, 128, { LARGE.grid }, { LARGE.surfaces }, 64, 2500>>(), LARGE);
+        for (name, capacities) in [("320 x 240 x 48", SMALL), ("512 x 384 x 64", LAGR), ("1242 x 375 x 128", LARGE)] {
+            std::println!("{name}: {} bytes", memory_bytes(&capacities));
+        }
+    }
+
+    /// What an integrator plans with: a change of these shows up in review.
+    #[test]
+    fn sizes_are_those_that_were_agreed() {
+        let kib = |width, height, disparities| {
+            memory_bytes(&Capacities::for_pictures(width, height, disparities)).div_ceil(1024)
+        };
+        let found = [kib(128, 96, 16), kib(320, 240, 48), kib(512, 384, 64), kib(640, 480, 64), kib(1242, 375, 128)];
+        assert_eq!(found, [113, 386, 849, 1255, 2110], "KiB");
+    }
+}
