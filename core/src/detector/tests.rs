@@ -48,7 +48,7 @@ fn configured() -> Box<Small> {
 fn good_pair(seed: u64) -> (Vec<u8>, Vec<u8>) {
     let mut random = Random::seeded("texture", seed);
     let texture: Vec<u8> = (0..256 * 256).map(|_| random.below(256) as u8).collect();
-    let mut draw = |eye_y: f64| -> Vec<u8> {
+    let draw = |eye_y: f64| -> Vec<u8> {
         let (sin, cos) = 10.0_f64.to_radians().sin_cos();
         (0..WIDTH * HEIGHT)
             .map(|i| {
