@@ -150,3 +150,7 @@ impl<'a> DisparityPicture<'a> {
         self.pixels
     }
 }
+
+#[cfg(test)]
+#[path = "disparity_tests.rs"]
+mod tests;

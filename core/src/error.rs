@@ -87,3 +87,7 @@ impl core::fmt::Display for ConfigProblem {
 }
 
 impl core::error::Error for ConfigError {}
+
+#[cfg(test)]
+#[path = "error_tests.rs"]
+mod tests;

@@ -90,3 +90,7 @@ impl core::fmt::Display for PictureError {
 }
 
 impl core::error::Error for PictureError {}
+
+#[cfg(test)]
+#[path = "picture_tests.rs"]
+mod tests;

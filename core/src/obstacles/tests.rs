@@ -106,7 +106,7 @@ fn every_threshold_counts() {
         clearance_m: 5.0,
         min_pixels: 0,
         min_size_m: 0.0,
-        max_range_m: 40.0,
+        max_range_m: 50.0,
     };
     let obstacles = find(&world, &loose);
     let [found] = obstacles[..] else { panic!("{obstacles:?}") };
@@ -118,6 +118,8 @@ fn every_threshold_counts() {
         (ObstacleSettings { min_height_m: found.max_m[2] + 1.0e-3, ..loose }, 0),
         (ObstacleSettings { clearance_m: found.min_m[2] + 1.0e-3, ..loose }, 1),
         (ObstacleSettings { clearance_m: found.min_m[2] - 1.0e-3, ..loose }, 0),
+        (ObstacleSettings { max_range_m: 3.7, ..loose }, 1),
+        (ObstacleSettings { max_range_m: 3.4, ..loose }, 0),
         (ObstacleSettings { min_pixels: pixels, ..loose }, 1),
         (ObstacleSettings { min_pixels: pixels + 1, ..loose }, 0),
         (ObstacleSettings { min_size_m: size - 1.0e-3, ..loose }, 1),
@@ -217,4 +219,5 @@ fn settings_that_cannot_be_are_named() {
     assert_eq!(field(ObstacleSettings { clearance_m: 0.1, ..good }), "obstacles.clearance_m");
     assert_eq!(field(ObstacleSettings { min_pixels: 10_001, ..good }), "obstacles.min_pixels");
     assert_eq!(field(ObstacleSettings { min_size_m: f32::NAN, ..good }), "obstacles.min_size_m");
+    assert_eq!(field(ObstacleSettings { max_range_m: 0.0, ..good }), "obstacles.max_range_m");
 }

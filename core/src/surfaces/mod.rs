@@ -267,9 +267,9 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
                 }
             }
         }
-        for i in 0..count {
-            self.shifts[i] = (u32::BITS - farthest[i].leading_zeros()).saturating_sub(16) as u8;
-            self.moments[i] = Moments::ZERO;
+        for ((farthest, shift), moments) in farthest.iter().zip(&mut self.shifts).zip(&mut self.moments).take(count) {
+            *shift = (u32::BITS - farthest.leading_zeros()).saturating_sub(16) as u8;
+            *moments = Moments::ZERO;
         }
         let middle = (TILE / 2) as i32;
         for y in 0..tile.height {
@@ -293,13 +293,13 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         let mut renumbered = [0u8; MAX_SURFACES];
         let (mut kept, mut left_out) = (0u8, false);
         let (u, v) = ((tile.x + TILE / 2) as f32, (tile.y + TILE / 2) as f32);
-        for i in 0..count {
+        for (i, number) in renumbered.iter_mut().enumerate().take(count) {
             let moments = &self.moments[i];
             let unit_m = depth.scale_m() * (1u32 << self.shifts[i]) as f32;
             let surface = self.classify(moments.scatter(rays, u, v, unit_m));
             if keep.keeps(moments.pixels()) && self.table.push(surface).is_ok() {
                 kept += 1;
-                renumbered[i] = kept;
+                *number = kept;
             } else {
                 left_out = true;
             }

@@ -1,0 +1,48 @@
+//! All 65,536 pixels, and pictures of every shape.
+
+use super::*;
+
+#[test]
+fn any_bits_are_a_disparity_or_a_reason() {
+    for bits in 0..=u16::MAX {
+        let pixel = DisparityPixel::from_bits(bits);
+        assert_eq!(pixel.bits(), bits);
+        match bits {
+            0 => assert_eq!(pixel.get(), Err(Reason::OutOfRange)),
+            1..0x8000 => {
+                let disparity = pixel.get().unwrap();
+                assert_eq!(disparity.to_num::<f64>(), f64::from(bits) / 16.0);
+                assert_eq!(pixel, DisparityPixel::from_steps(bits));
+            }
+            _ => {
+                let code = usize::from(bits - 0x8000);
+                let reason = *Reason::ALL.get(code).unwrap_or(&Reason::OutsideValidArea);
+                assert_eq!(pixel.get(), Err(reason));
+                assert_eq!(DisparityPixel::from_steps(bits), DisparityPixel::none(Reason::OutOfRange));
+            }
+        }
+        assert_eq!(pixel.has_value(), pixel.get().is_ok());
+        assert_eq!(pixel.steps(), if pixel.has_value() { bits } else { 0 });
+    }
+    for (code, reason) in Reason::ALL.into_iter().enumerate() {
+        assert_eq!(reason as usize, code);
+        assert_eq!(DisparityPixel::none(reason).get(), Err(reason));
+    }
+}
+
+#[test]
+fn pictures_have_whole_rows_only() {
+    let pixels: [DisparityPixel; 24] = core::array::from_fn(|i| DisparityPixel::from_steps(i as u16 + 1));
+    for len in 0..=24 {
+        for width in 0..=26 {
+            let picture = DisparityPicture::new(&pixels[..len], width);
+            let height = len.checked_div(width).unwrap_or(0);
+            assert_eq!((picture.width(), picture.height()), (width, height));
+            assert_eq!(picture.pixels(), &pixels[..width * height]);
+            for y in 0..height {
+                assert_eq!(picture.row(y), &pixels[y * width..(y + 1) * width]);
+            }
+            assert!(picture.row(height).is_empty() && picture.row(usize::MAX).is_empty());
+        }
+    }
+}
