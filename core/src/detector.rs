@@ -170,6 +170,8 @@ pub struct Detector<
 #[derive(Clone, Copy)]
 struct Setup {
     pair: RectifiedPair,
+    /// Width and height of the left and the right picture as they arrive.
+    picture_sizes: [(usize, usize); 2],
     frame: VehicleFrame,
     rays: Rays,
     nearest_m: f32,
@@ -217,6 +219,7 @@ impl<
         mount: &Mount,
     ) -> Result<(), ConfigError> {
         self.setup = None;
+        self.detection.clear();
         let frame = VehicleFrame::new(mount)?;
         let pair = self.rectifier.configure(calibration)?;
         // The mount speaks of the left camera as it is; disparities are seen by the rectified one.
@@ -235,8 +238,8 @@ impl<
         // The last disparity has no neighbour to interpolate with and is never reported.
         let largest = f32::from(min_disparity) + f32::from(disparities) - 2.0;
         let nearest_m = pair.distance_m(largest);
-        self.setup = Some(Setup { pair, frame, rays: Rays::new(&pair, &frame), nearest_m });
-        self.detection = Detection::new();
+        let picture_sizes = [Side::Left, Side::Right].map(|side| self.rectifier.raw_size(side));
+        self.setup = Some(Setup { pair, picture_sizes, frame, rays: Rays::new(&pair, &frame), nearest_m });
         Ok(())
     }
 
@@ -255,14 +258,13 @@ impl<
     ) -> Result<&Detection<OBSTACLES, CELLS>, DetectError> {
         self.detection.clear();
         let Some(setup) = self.setup else { return Err(DetectError::NotConfigured) };
-        let expected = (setup.pair.width as usize, setup.pair.height as usize);
-        for picture in [left, right] {
+        for (picture, expected) in [left, right].into_iter().zip(setup.picture_sizes) {
             let found = (picture.width(), picture.height());
             if found != expected {
                 return Err(DetectError::WrongSize { found, expected });
             }
         }
-        let (width, height) = expected;
+        let (width, height) = (setup.pair.width as usize, setup.pair.height as usize);
         self.match_rows(left, right, width, height, probe);
 
         probe.enter(Stage::Validate);
@@ -286,7 +288,7 @@ impl<
             self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &mut detection.obstacles);
 
         probe.enter(Stage::Map);
-        let Setup { pair, frame, rays, nearest_m } = &setup;
+        let Setup { pair, frame, rays, nearest_m, .. } = &setup;
         let view = View { pair, frame, rays, depth: &self.depth, nearest_m: *nearest_m };
         self.map.run(&self.surfaces, picture, &view, &terrain, ground.is_some(), &mut detection.map);
         detection.sectors = SectorDistances::of(&detection.map);
@@ -510,3 +512,6 @@ impl Statistics {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,13 +1,17 @@
 //! A world of flat patches for the tests of this crate: what a perfect stereo camera would see, worked out in f64 with
 //! matrices of its own.
 
-use std::{vec, vec::Vec};
+use std::{boxed::Box, vec, vec::Vec};
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::{
+    disparity::DisparityPicture,
     disparity::{DisparityPixel, Reason},
     geometry::{DepthTable, Mount, Rays, RectifiedPair, VehicleFrame},
+    ground::{GroundFinder, GroundPlane, GroundSettings, Terrain},
+    obstacles::{Obstacle, ObstacleFinder, ObstacleSettings},
+    surfaces::{Regions, SurfaceSettings, Surfaces},
 };
 
 pub(crate) type Point = Vector3<f64>;
@@ -175,4 +179,64 @@ impl World {
 /// Level ground at a height.
 pub(crate) fn ground(height_m: f64) -> Patch {
     Patch::new([0.0, 0.0, height_m], [1000.0, 0.0, 0.0], [0.0, 1000.0, 0.0])
+}
+
+/// The stages from the surfaces to the obstacles, for pictures of [`PAIR`].
+pub(crate) struct Stages {
+    pub(crate) surfaces: Box<Surfaces<{ 320 * 240 }, 1024>>,
+    pub(crate) regions: Box<Regions<1024>>,
+    pub(crate) ground: GroundFinder,
+    pub(crate) obstacles: ObstacleFinder,
+    pub(crate) depth: DepthTable<DISPARITIES>,
+    pub(crate) rays: Rays,
+    pub(crate) frame: VehicleFrame,
+}
+
+impl Stages {
+    /// Stages that take `mount` for that of the camera.
+    pub(crate) fn new(mount: &Mount, ground: &GroundSettings, obstacles: &ObstacleSettings) -> Self {
+        let frame = VehicleFrame::new(mount).unwrap();
+        let mut stages = Self {
+            surfaces: Box::new(Surfaces::new()),
+            regions: Box::new(Regions::new()),
+            ground: GroundFinder::new(),
+            obstacles: ObstacleFinder::new(),
+            depth: DepthTable::new(),
+            rays: Rays::new(&PAIR, &frame),
+            frame,
+        };
+        stages.depth.configure(&PAIR, 0, DISPARITIES as u16);
+        stages.surfaces.configure(&SurfaceSettings::default(), 320, 240).unwrap();
+        stages.ground.configure(ground, &frame, mount.height_m.is_some(), 320 * 240).unwrap();
+        stages.obstacles.configure(obstacles).unwrap();
+        stages
+    }
+
+    /// Surfaces and ground.
+    pub(crate) fn ground(&mut self, pixels: &[DisparityPixel]) -> Option<GroundPlane> {
+        let picture = DisparityPicture::new(pixels, 320);
+        self.surfaces.run(picture, &self.depth, &self.rays);
+        self.ground.run(&mut self.surfaces, &mut self.regions, picture)
+    }
+
+    /// Where heights are measured from.
+    pub(crate) fn terrain(&self, ground: Option<GroundPlane>) -> Terrain {
+        match ground {
+            Some(plane) => self.ground.terrain(plane, self.surfaces.table()),
+            None => Terrain::flat(GroundPlane::of_mount(&self.frame)),
+        }
+    }
+
+    /// All of them: the ground, the obstacles and how many were dropped.
+    pub(crate) fn run<const OBSTACLES: usize>(
+        &mut self,
+        pixels: &[DisparityPixel],
+    ) -> (Option<GroundPlane>, Vec<Obstacle>, u32) {
+        let ground = self.ground(pixels);
+        let terrain = self.terrain(ground);
+        let mut obstacles = heapless::Vec::<_, OBSTACLES, u16>::new();
+        let picture = DisparityPicture::new(pixels, 320);
+        let dropped = self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &mut obstacles);
+        (ground, obstacles.to_vec(), dropped)
+    }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use fencepost_core::{
     geometry::Mount,
     ground::GroundSettings,
+    health::HealthSettings,
     map::MapSettings,
     matching::MatchSettings,
     obstacles::ObstacleSettings,
@@ -42,6 +43,7 @@ struct Sections {
     ground: GroundSettings,
     obstacles: ObstacleSettings,
     map: MapSettings,
+    health: HealthSettings,
     mount: Option<Mount>,
     wire: WireSettings,
 }
@@ -86,10 +88,10 @@ impl Config {
         };
         let table: toml::Table = text.parse().map_err(wrong)?;
         let chose_disparities = table.get("matching").and_then(|section| section.get("disparities")).is_some();
-        let Sections { matching, validate, surfaces, ground, obstacles, map, mount, wire } =
+        let Sections { matching, validate, surfaces, ground, obstacles, map, health, mount, wire } =
             toml::from_str(&text).map_err(wrong)?;
         Ok(Self {
-            settings: Settings { matching, validate, surfaces, ground, obstacles, map },
+            settings: Settings { matching, validate, surfaces, ground, obstacles, map, health },
             disparities: chose_disparities.then_some(matching.disparities),
             mount,
             wire,

@@ -48,6 +48,7 @@ pub const fn stage_words(stage: Stage) -> &'static str {
         Stage::Ground => "joins level surfaces and fits the ground plane",
         Stage::Obstacles => "joins upright surfaces and measures them",
         Stage::Map => "sorts everything into cells",
+        Stage::Health => "judges how far all this can be trusted",
     }
 }
 

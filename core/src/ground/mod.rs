@@ -82,7 +82,8 @@ impl GroundFinder {
             let age_frames = last.age_frames.saturating_add(1);
             (age_frames <= self.settings.hold_frames).then_some(GroundPlane { age_frames, ..last })
         });
-        self.last = plane;
+        // Without holding, no frame has a say in the next.
+        self.last = plane.filter(|_| self.settings.hold_frames > 0);
         if let Some(plane) = plane {
             self.spread(&plane, surfaces, regions);
         }
@@ -223,3 +224,6 @@ impl Default for GroundFinder {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests;

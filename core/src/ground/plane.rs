@@ -13,7 +13,7 @@ pub struct GroundPlane {
     pub camera_height_m: f32,
     /// Tilt of the optical axis below the plane, radians.
     pub pitch_down_rad: f32,
-    /// Roll of the camera against the plane, radians; positive if the camera leans to the right.
+    /// Roll of the camera about its optical axis against the plane, radians; positive if the camera leans to the right.
     pub roll_rad: f32,
     /// Pixels that support it.
     pub support: u32,
@@ -41,13 +41,15 @@ impl GroundPlane {
 
     fn new(normal: [f32; 3], offset_m: f32, frame: &VehicleFrame) -> Self {
         let camera_m = frame.point([0.0; 3]);
-        let dip = |axis: [f32; 3]| libm::asinf((-dot(normal, frame.direction(axis))).clamp(-1.0, 1.0));
+        // How far the camera's axes point below the plane.
+        let [right, down, forward] =
+            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| -dot(normal, frame.direction(axis)));
         Self {
             normal,
             offset_m,
             camera_height_m: dot(normal, camera_m) - offset_m,
-            pitch_down_rad: dip([0.0, 0.0, 1.0]),
-            roll_rad: dip([1.0, 0.0, 0.0]),
+            pitch_down_rad: libm::asinf(forward.clamp(-1.0, 1.0)),
+            roll_rad: libm::atan2f(right, down),
             support: 0,
             rms_m: 0.0,
             age_frames: 0,

@@ -24,7 +24,7 @@ pub struct GroundSettings {
     pub corridor_m: f32,
     /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
     pub min_support_permille: f32,
-    /// Frames for which the last plane is held when a frame has none.
+    /// Frames for which the last plane is held when a frame has none; with 0 each frame stands on its own.
     pub hold_frames: u16,
 }
 

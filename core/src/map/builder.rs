@@ -94,7 +94,9 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
     ) {
         let geometry = self.settings.geometry;
         self.evidence[..geometry.len()].fill(Evidence::default());
-        for y in 0..picture.height() {
+        // The surfaces of another picture say nothing about this one.
+        let height = if (picture.width(), picture.height()) == surfaces.size() { picture.height() } else { 0 };
+        for y in 0..height {
             for x in (0..picture.width()).step_by(TILE) {
                 self.collect(surfaces, picture, view, ground, (x, y));
             }
@@ -223,10 +225,11 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             None => UnknownReason::OutsideView,
             Some(_) if seen.distance_m < view.nearest_m => UnknownReason::TooNear,
             Some(_) if !ground_seen => UnknownReason::NoGround,
-            Some((u, v)) => match picture.row(v)[u].get() {
-                Ok(_) => UnknownReason::TooFewPixels,
-                Err(Reason::LowTexture | Reason::Saturated) => UnknownReason::LowTexture,
-                Err(_) => UnknownReason::NoMatch,
+            Some((u, v)) => match picture.row(v).get(u).map(|pixel| pixel.get()) {
+                None => UnknownReason::OutsideView,
+                Some(Ok(_)) => UnknownReason::TooFewPixels,
+                Some(Err(Reason::LowTexture | Reason::Saturated)) => UnknownReason::LowTexture,
+                Some(Err(_)) => UnknownReason::NoMatch,
             },
         })
     }

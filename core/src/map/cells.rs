@@ -108,7 +108,7 @@ impl MapGeometry {
     /// Cell `(i, j)` at a place in the table.
     pub const fn cell_at(&self, index: usize) -> (i16, i16) {
         let columns = if self.y_count == 0 { 1 } else { self.y_count as usize };
-        (self.x_first + (index / columns) as i16, self.y_first + (index % columns) as i16)
+        (self.x_first.saturating_add((index / columns) as i16), self.y_first.saturating_add((index % columns) as i16))
     }
 
     /// Centre of cell `(i, j)`, metres.

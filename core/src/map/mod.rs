@@ -10,3 +10,6 @@ pub use builder::{MapBuilder, View};
 pub use cells::{Cell, CellState, MapGeometry, ObstacleMap, UnknownReason};
 pub use sectors::{SECTOR_CLEAR_DM, SECTOR_COUNT, SECTOR_UNKNOWN, SectorDistances};
 pub use settings::MapSettings;
+
+#[cfg(test)]
+mod tests;

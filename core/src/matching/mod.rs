@@ -195,8 +195,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
                 choose(costs, candidates, min_disparity + disparities - 1, self.settings.uniqueness_percent)
             };
         }
-        if let Some(tolerance) = self.settings.back_check_px {
-            self.back_check(&mut out[first..end], first, i32::from(tolerance));
+        if self.settings.back_check {
+            self.back_check(&mut out[first..end], first, i32::from(self.settings.back_check_px));
         }
     }
 

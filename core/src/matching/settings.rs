@@ -31,8 +31,10 @@ pub struct MatchSettings {
     /// A match must be better by this many percent than any other that is more than one pixel away; 0 turns the
     /// uniqueness check off. Mild, as texture.
     pub uniqueness_percent: u16,
-    /// Largest difference between the match from left to right and the one back, px; `None` turns the back-check off.
-    pub back_check_px: Option<u16>,
+    /// Whether a pixel loses its match if its partner in the right picture matches another one better.
+    pub back_check: bool,
+    /// Largest difference between the match from left to right and the one back, px.
+    pub back_check_px: u16,
     /// A window with more than this share of pixels at 0 or 255 is saturated, percent; 100 turns the check off.
     pub saturated_percent: u16,
 }
@@ -52,7 +54,8 @@ impl MatchSettings {
         prefilter: Prefilter::HorizontalSobel,
         texture: 16,
         uniqueness_percent: 8,
-        back_check_px: Some(1),
+        back_check: true,
+        back_check_px: 1,
         saturated_percent: 60,
     };
     /// All zero, for a matcher that is not configured: a detector of zeros takes no room in the image of a program.
@@ -63,7 +66,8 @@ impl MatchSettings {
         prefilter: Prefilter::HorizontalSobel,
         texture: 0,
         uniqueness_percent: 0,
-        back_check_px: None,
+        back_check: false,
+        back_check_px: 0,
         saturated_percent: 0,
     };
 
@@ -88,7 +92,7 @@ impl MatchSettings {
         }
         range("matching.texture", self.texture, 0, 1000)?;
         range("matching.uniqueness_percent", self.uniqueness_percent, 0, 100)?;
-        range("matching.back_check_px", self.back_check_px.unwrap_or(0), 0, 64)?;
+        range("matching.back_check_px", self.back_check_px, 0, 64)?;
         range("matching.saturated_percent", self.saturated_percent, 1, 100)
     }
 }

@@ -96,7 +96,10 @@ impl Plain<'_> {
         let slope = farther.max(nearer) - best;
         let offset = if slope == 0 { 0.0 } else { 8.0 * f64::from(farther - nearer) / f64::from(slope) };
         let pixel = DisparityPixel::from_steps((d * 16 + offset.round() as i32) as u16);
-        let (Some(tolerance), true) = (self.settings.back_check_px, pixel.has_value()) else { return pixel };
+        if !self.settings.back_check || !pixel.has_value() {
+            return pixel;
+        }
+        let tolerance = self.settings.back_check_px;
         let rounded = (i32::from(pixel.steps()) + 8) / 16;
         let partner = x - rounded;
         let back = (0..self.left[0].len() as i32)
@@ -122,7 +125,8 @@ fn agrees_with_a_plain_version_on_random_pictures() {
             prefilter: if random.below(2) == 0 { Prefilter::Grey } else { Prefilter::HorizontalSobel },
             texture: random.below(60) as u16,
             uniqueness_percent: random.below(12) as u16,
-            back_check_px: (random.below(4) > 0).then(|| random.below(3) as u16),
+            back_check: random.below(4) > 0,
+            back_check_px: random.below(3) as u16,
             saturated_percent: 5 + random.below(96) as u16,
         };
         let width = 16 + random.below(60) as usize;

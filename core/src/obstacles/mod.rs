@@ -113,6 +113,10 @@ impl ObstacleFinder {
     }
 
     fn stands_up(&self, surface: &Surface, ground: &Terrain) -> bool {
+        let [x, y, _] = surface.points.mean_m;
+        if x * x + y * y > self.settings.max_range_m * self.settings.max_range_m {
+            return false;
+        }
         match surface.class {
             SurfaceClass::Vertical | SurfaceClass::Obstacle => true,
             SurfaceClass::Ground => false,
@@ -188,3 +192,6 @@ fn insert<const N: usize>(obstacles: &mut Vec<Obstacle, N, u16>, obstacle: Obsta
     let _ = obstacles.insert(place, obstacle);
     u32::from(full)
 }
+
+#[cfg(test)]
+mod tests;

@@ -17,12 +17,20 @@ pub struct ObstacleSettings {
     pub min_pixels: u16,
     /// An obstacle is at least this long, wide or high, metres.
     pub min_size_m: f32,
+    /// Surfaces farther away take no part, metres: there, what hangs together in the picture may lie far apart.
+    pub max_range_m: f32,
 }
 
 impl ObstacleSettings {
     /// All zero, for a stage that is not configured.
-    pub(super) const UNSET: Self =
-        Self { min_height_m: 0.0, platform_height_m: 0.0, clearance_m: 0.0, min_pixels: 0, min_size_m: 0.0 };
+    pub(super) const UNSET: Self = Self {
+        min_height_m: 0.0,
+        platform_height_m: 0.0,
+        clearance_m: 0.0,
+        min_pixels: 0,
+        min_size_m: 0.0,
+        max_range_m: 0.0,
+    };
 
     /// Checks every value.
     ///
@@ -33,12 +41,20 @@ impl ObstacleSettings {
         ConfigError::check("obstacles.platform_height_m", self.platform_height_m, self.min_height_m, 5.0)?;
         ConfigError::check("obstacles.clearance_m", self.clearance_m, self.min_height_m, 20.0)?;
         ConfigError::check("obstacles.min_pixels", f32::from(self.min_pixels), 0.0, 10_000.0)?;
-        ConfigError::check("obstacles.min_size_m", self.min_size_m, 0.0, 5.0)
+        ConfigError::check("obstacles.min_size_m", self.min_size_m, 0.0, 5.0)?;
+        ConfigError::check("obstacles.max_range_m", self.max_range_m, 0.1, 1000.0)
     }
 }
 
 impl Default for ObstacleSettings {
     fn default() -> Self {
-        Self { min_height_m: 0.25, platform_height_m: 0.6, clearance_m: 2.2, min_pixels: 40, min_size_m: 0.15 }
+        Self {
+            min_height_m: 0.25,
+            platform_height_m: 0.6,
+            clearance_m: 2.2,
+            min_pixels: 40,
+            min_size_m: 0.15,
+            max_range_m: 40.0,
+        }
     }
 }

@@ -109,6 +109,14 @@ impl<const GRID: usize> Rectifier<GRID> {
         &self.pair
     }
 
+    /// Width and height of the pictures as they arrive.
+    pub const fn raw_size(&self, side: Side) -> (usize, usize) {
+        if !self.remaps {
+            return (self.pair.width as usize, self.pair.height as usize);
+        }
+        self.camera(side).map.raw_size()
+    }
+
     /// The rotation from the raw camera's frame into the rectified one, row by row; none for pairs that arrive rectified.
     pub const fn rotation(&self, side: Side) -> Option<&[[f32; 3]; 3]> {
         if self.remaps { Some(self.camera(side).map.rotation()) } else { None }

@@ -206,6 +206,11 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         self.tiles.get(tile).map_or(0, |&first| usize::from(first))
     }
 
+    /// Width and height of the pictures.
+    pub(crate) const fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
     /// Settings in force.
     pub(crate) const fn settings(&self) -> &SurfaceSettings {
         &self.settings
