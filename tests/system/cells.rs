@@ -1,7 +1,6 @@
 //! Cells against lidar, and against the truth of rendered scenes.
 
 use fencepost::{config::Config, detector};
-use fencepost_core::map::CellState;
 use fencepost_hal::{
     camera::Camera,
     scene::{Scene, SceneOptions, Score, score},
@@ -76,14 +75,4 @@ pub(crate) fn for_each_frame(options: SceneOptions, mut look: impl FnMut(&Scene,
         assert_eq!(seen, Ok(Some(())));
         look(camera.scene(), frame, &detector);
     }
-}
-
-/// Number of cells of a state whose centres lie at least so far ahead.
-pub(crate) fn count(detector: &detector::ProgramDetector, state: CellState, from_x_m: f32) -> usize {
-    let map = &detector.detection().map;
-    let ahead = |index: usize| {
-        let (i, j) = map.geometry.cell_at(index);
-        map.geometry.centre_m(i, j).0 >= from_x_m
-    };
-    map.cells.iter().enumerate().filter(|(index, cell)| cell.state == state && ahead(*index)).count()
 }
