@@ -70,7 +70,7 @@ impl Default for MapSettings {
     fn default() -> Self {
         Self {
             geometry: MapGeometry::default(),
-            obstacle_cover: 0.1,
+            obstacle_cover: 0.05,
             obstacle_min_pixels: 8,
             free_cover: 0.1,
             free_min_pixels: 4,
