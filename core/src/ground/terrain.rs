@@ -87,3 +87,7 @@ fn band(x_m: f32) -> Option<usize> {
     let place = x_m / BAND_M;
     (place >= 0.0 && place < BANDS as f32).then_some(place as usize)
 }
+
+#[cfg(test)]
+#[path = "terrain_tests.rs"]
+mod tests;

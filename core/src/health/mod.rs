@@ -74,3 +74,6 @@ fn out_of_range_below(picture: DisparityPicture<'_>) -> f32 {
     let out_of_range = lower.iter().filter(|pixel| pixel.get() == Err(Reason::OutOfRange)).count();
     out_of_range as f32 / lower.len().max(1) as f32
 }
+
+#[cfg(test)]
+mod tests;
