@@ -118,9 +118,13 @@ impl Console {
     }
 
     fn say(&self, text: fmt::Arguments<'_>) {
+        // Whoever listens may be gone, as when the output is piped into `head`: that is no reason to stop the work.
+        let write = || {
+            let _ = writeln!(std::io::stderr(), "{text}");
+        };
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{text}")),
-            None => eprintln!("{text}"),
+            Some(bar) => bar.suspend(write),
+            None => write(),
         }
     }
 }

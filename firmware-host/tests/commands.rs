@@ -92,3 +92,26 @@ fn quiet_says_nothing_and_verbose_says_more() {
     replay("--quiet").stdout("").stderr("");
     replay("--verbose").stderr(contains("frame 3: "));
 }
+
+#[test]
+fn a_listener_that_leaves_does_not_stop_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_fencepost"))
+        .current_dir(folder.path())
+        .args(["-q", "demo", "--out", "first", "--record", "recording", "--frames", "1"])
+        .spawn()
+        .unwrap();
+    assert!(child.wait().unwrap().success());
+    // A pipe that nobody reads.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_fencepost"))
+        .current_dir(folder.path())
+        .args(["-v", "replay", "recording", "--out", "second", "--write", "cells"])
+        .stdout(writer.try_clone().unwrap())
+        .stderr(writer)
+        .spawn()
+        .unwrap();
+    assert!(child.wait().unwrap().success());
+    assert!(folder.path().join("second/summary.json").is_file());
+}
