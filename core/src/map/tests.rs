@@ -148,7 +148,8 @@ fn cells_are_those_of_a_plain_count_of_votes() {
         [scene(), { World { roll_deg: -6.0, pitch_down_deg: 20.0, ..scene() } }, World { height_m: 0.7, ..scene() }];
     let small = MapGeometry { cell_size_mm: 250, x_first: 2, x_count: 50, y_first: -20, y_count: 50 };
     for (world, geometry) in worlds.iter().flat_map(|w| [(w, MapGeometry::default()), (w, small)]) {
-        let settings = MapSettings { geometry, max_range_m: 14.0, ..MapSettings::default() };
+        // A limit far from the few votes that rounding can move from cell to cell, so that most cells can be judged.
+        let settings = MapSettings { geometry, max_range_m: 14.0, obstacle_cover: 0.1, ..MapSettings::default() };
         let made = make(world, settings, &GroundSettings::default());
         assert!(made.ground.is_some());
         let votes = plain_votes(world, &made);

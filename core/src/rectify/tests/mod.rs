@@ -5,22 +5,14 @@ mod model;
 mod recordings;
 mod rows;
 
-use crate::geometry::{CameraModel, Distortion, RawPair};
-
-/// SplitMix64.
-struct Random(u64);
+use crate::{
+    geometry::{CameraModel, Distortion, RawPair},
+    test_random::Random,
+};
 
 impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn within(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * (self.bits() >> 40) as f32 / (1_u32 << 24) as f32
+    fn within_f32(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * (self.next() >> 40) as f32 / (1_u32 << 24) as f32
     }
 }
 
