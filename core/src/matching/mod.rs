@@ -114,8 +114,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         self.columns.slide(enter, leave, disparities, usize::from(self.settings.min_disparity));
     }
 
-    /// The next row of disparities that is complete, if there is one: writes it to `out` and returns its number. To be
-    /// called after every [`Self::push`] until it returns `None`; after the last row it delivers the rest.
+    /// Writes disparity row `next` to `out` if all that it needs has come; says whether it did. Rows are to be taken in order,
+    /// each as soon as it is there: after every [`Self::push`], until this says no. After the last push it delivers the rest.
     pub fn pull(&mut self, next: usize, out: &mut [DisparityPixel]) -> bool {
         if next >= self.height || out.len() != self.width {
             return false;
