@@ -32,19 +32,30 @@ const REGIONS: usize = 3;
 /// surfaces that lie on it, wherever they are: bits of ground seen between obstacles count too.
 ///
 /// # Bound
-/// The joining of regions, and up to 20 passes over the table of surfaces.
+/// The joining of regions, and up to 25 passes over the table of surfaces.
 pub struct GroundFinder {
     settings: GroundSettings,
     frame: Option<VehicleFrame>,
     height_known: bool,
     min_support: f32,
+    /// Tangent and cosine of the largest tilt.
+    max_slope: f32,
+    least_upright: f32,
     last: Option<GroundPlane>,
 }
 
 impl GroundFinder {
     /// A stage that is not configured and finds nothing.
     pub const fn new() -> Self {
-        Self { settings: GroundSettings::UNSET, frame: None, height_known: false, min_support: 0.0, last: None }
+        Self {
+            settings: GroundSettings::UNSET,
+            frame: None,
+            height_known: false,
+            min_support: 0.0,
+            max_slope: 0.0,
+            least_upright: 0.0,
+            last: None,
+        }
     }
 
     /// Takes settings, the frame of the vehicle and the size of the pictures, and forgets the ground of earlier frames.
@@ -63,6 +74,9 @@ impl GroundFinder {
         self.frame = Some(*frame);
         self.height_known = height_known;
         self.min_support = settings.min_support_permille * 1.0e-3 * pixels as f32;
+        let max_tilt = settings.max_tilt_deg.to_radians();
+        self.max_slope = libm::tanf(max_tilt);
+        self.least_upright = libm::cosf(max_tilt);
         self.last = None;
         Ok(())
     }
@@ -125,10 +139,9 @@ impl GroundFinder {
     /// Whether a surface is near-horizontal and where ground can be, for all tilts and heights that are allowed.
     fn may_be_ground(&self, surface: &Surface) -> bool {
         let [x, y, z] = surface.points.mean_m;
-        let slope = libm::tanf(self.settings.max_tilt_deg.to_radians());
         let reach = if self.height_known { self.settings.height_tolerance_m } else { f32::INFINITY };
         let level = if self.height_known { 0.0 } else { f32::NEG_INFINITY };
-        let allowance = reach + slope * libm::sqrtf(x * x + y * y);
+        let allowance = reach + self.max_slope * libm::sqrtf(x * x + y * y);
         let near = x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m;
         surface.class == SurfaceClass::Horizontal && near && z <= allowance && z >= level - allowance
     }
@@ -210,7 +223,7 @@ impl GroundFinder {
     }
 
     fn plausible(&self, plane: &GroundPlane) -> bool {
-        let level = plane.normal[2] >= libm::cosf(self.settings.max_tilt_deg.to_radians());
+        let level = plane.normal[2] >= self.least_upright;
         let expected = self.frame.map_or(0.0, |frame| frame.camera_height_m());
         let off = (plane.camera_height_m - expected).abs();
         let height =

@@ -9,8 +9,11 @@ const BAND_M: f32 = 1.0;
 /// Number of bands.
 const BANDS: usize = 48;
 
-/// Pixels that a band is worth trusting from; fewer count in proportion against what the neighbours say.
-const FULL_WEIGHT: f32 = 200.0;
+/// Pixels that the plane itself counts for under the robot, where the ground is too near to be seen.
+const PLANE_WEIGHT: f32 = 200.0;
+
+/// How much of what a band knows still counts in the next one.
+const FADE: f32 = 0.15;
 
 /// The ground ahead: the plane, and its deviation from the plane in bands of 1 m along x, linear between their middles.
 ///
@@ -46,7 +49,7 @@ impl Terrain {
         // Forth and back, each band takes in what its neighbour knows, fading with the distance: gaps are filled, bands with
         // little support are held by those around them. The plane itself speaks for the ground under the robot.
         let mut forth = ([0.0_f32; BANDS], [0.0_f32; BANDS]);
-        let mut carried = (FULL_WEIGHT, 0.0);
+        let mut carried = (PLANE_WEIGHT, 0.0);
         for i in 0..BANDS {
             forth.0[i] = carried.0;
             forth.1[i] = carried.1;
@@ -79,9 +82,6 @@ impl Terrain {
         self.plane.height_m(p) - self.lift_m(p[0])
     }
 }
-
-/// How much of what a band knows still counts in the next one.
-const FADE: f32 = 0.15;
 
 fn band(x_m: f32) -> Option<usize> {
     let place = x_m / BAND_M;

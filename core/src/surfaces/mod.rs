@@ -89,6 +89,9 @@ pub struct SurfaceReport {
 /// Five passes of `width x height` steps, and an eigen-solution for each surface.
 pub struct Surfaces<const PIXELS: usize, const SURFACES: usize> {
     settings: SurfaceSettings,
+    /// Cosines of the limits of the classes.
+    least_dot_of_horizontal: f32,
+    most_dot_of_vertical: f32,
     width: usize,
     height: usize,
     /// Number of the surface of each pixel within its tile, from 1; 0 where there is none.
@@ -107,6 +110,8 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         const { assert!(SURFACES < u16::MAX as usize, "places in the table must fit 16 bits") };
         Self {
             settings: SurfaceSettings::UNSET,
+            least_dot_of_horizontal: 0.0,
+            most_dot_of_vertical: 0.0,
             width: 0,
             height: 0,
             labels: [0; PIXELS],
@@ -131,6 +136,8 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         capacity("calibration.width x calibration.height", width.saturating_mul(height), PIXELS)?;
         capacity("tiles of the picture", width.div_ceil(TILE) * height.div_ceil(TILE), SURFACES)?;
         self.settings = *settings;
+        self.least_dot_of_horizontal = libm::cosf(settings.horizontal_deg.to_radians());
+        self.most_dot_of_vertical = libm::cosf(settings.vertical_deg.to_radians());
         self.width = width;
         self.height = height;
         self.tiles.clear();
@@ -320,9 +327,9 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         };
         let mut surface = Surface { points, normal, rms_m: libm::sqrtf(variance), class: SurfaceClass::Slanted };
         let dot = surface.dot();
-        if dot >= libm::cosf(self.settings.horizontal_deg.to_radians()) {
+        if dot >= self.least_dot_of_horizontal {
             surface.class = SurfaceClass::Horizontal;
-        } else if dot <= libm::cosf(self.settings.vertical_deg.to_radians()) {
+        } else if dot <= self.most_dot_of_vertical {
             surface.class = SurfaceClass::Vertical;
         }
         surface
