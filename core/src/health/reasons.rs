@@ -37,11 +37,14 @@ pub enum HealthReason {
     TableFull = 14,
     Exchanged = 15,
     ExposureMismatch = 16,
+    BusTrouble = 17,
+    CommandTrouble = 18,
+    EchoMissing = 19,
 }
 
 impl HealthReason {
     /// Every reason, in the order of its bit.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 20] = [
         Self::StalePicture,
         Self::MissingPicture,
         Self::FrozenPicture,
@@ -59,6 +62,9 @@ impl HealthReason {
         Self::TableFull,
         Self::Exchanged,
         Self::ExposureMismatch,
+        Self::BusTrouble,
+        Self::CommandTrouble,
+        Self::EchoMissing,
     ];
 
     /// The name in files: lower case, words joined by `_`.
@@ -81,6 +87,9 @@ impl HealthReason {
             Self::TableFull => "table_full",
             Self::Exchanged => "exchanged",
             Self::ExposureMismatch => "exposure_mismatch",
+            Self::BusTrouble => "bus_trouble",
+            Self::CommandTrouble => "command_trouble",
+            Self::EchoMissing => "echo_missing",
         }
     }
 
@@ -104,6 +113,9 @@ impl HealthReason {
             Self::TableFull => "more surfaces or obstacles than there is room for: the smallest are left out",
             Self::Exchanged => "left and right seem to be exchanged",
             Self::ExposureMismatch => "left and right are exposed differently",
+            Self::BusTrouble => "frames could not be sent: the bus is disturbed, full, down or gone",
+            Self::CommandTrouble => "messages of the vehicle's controller are damaged or missing",
+            Self::EchoMissing => "the vehicle's controller no longer says that it takes scans over",
         }
     }
 }

@@ -1,7 +1,7 @@
 //! `demo`: what the program does, without a camera or a recording.
 
 use fencepost_hal::{
-    camera::{Camera, StereoPair},
+    camera::{Camera, CameraError, CameraErrorKind, StereoPair},
     recording::RecordingWriter,
     scene::{Scene, SceneCamera, SceneOptions},
 };
@@ -52,6 +52,13 @@ pub fn demo(args: &DemoArgs, console: &mut Console) -> Result<Ending, Failure> {
 struct Recorder {
     camera: SceneCamera,
     writer: Option<RecordingWriter>,
+}
+
+/// A pair that cannot be written down.
+impl CameraError for Failure {
+    fn kind(&self) -> CameraErrorKind {
+        CameraErrorKind::Unusable
+    }
 }
 
 impl Camera for Recorder {

@@ -9,18 +9,49 @@ pub struct StereoPair<'a> {
     pub left: Picture<'a>,
     /// Right picture.
     pub right: Picture<'a>,
-    /// Time of exposure, nanoseconds of a monotonic clock.
+    /// Time of exposure of the left picture, nanoseconds of a monotonic clock.
     pub timestamp_ns: u64,
+    /// Time of exposure of the right picture after that of the left one, nanoseconds.
+    pub skew_ns: i64,
     /// Number of the pair, from 0; gaps are frames that were lost.
     pub sequence: u32,
+    /// Pictures that were lost since the pair before, or had no partner.
+    pub missed: u32,
+}
+
+/// What an error of a camera means for whoever waits for pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CameraErrorKind {
+    /// No pair came within the camera's time-out. The next one may.
+    NoPicture,
+    /// This pair cannot be used. The next one may be good.
+    Damaged,
+    /// The device is gone. Every further call tries to open it again.
+    Lost,
+    /// The camera will never deliver: it cannot do what is asked of it.
+    Unusable,
+}
+
+/// An error of a camera. Says what, where and the mend.
+pub trait CameraError: core::error::Error {
+    /// What it means for whoever waits for pictures.
+    fn kind(&self) -> CameraErrorKind;
+}
+
+/// A camera without errors.
+impl CameraError for core::convert::Infallible {
+    fn kind(&self) -> CameraErrorKind {
+        match *self {}
+    }
 }
 
 /// A source of stereo pairs: a device, a recording, the scene renderer, all alike.
 pub trait Camera {
-    /// What can go wrong. Says what, where and the mend.
-    type Error: core::error::Error;
+    /// What can go wrong.
+    type Error: CameraError;
 
-    /// Waits for the next pair and lends it to `consume`; `None` when no further pair will come.
+    /// Waits for the next pair and lends it to `consume`; `None` when no further pair will come. A live camera waits no
+    /// longer than its time-out.
     ///
     /// # Errors
     /// When the pair cannot be had; the next call tries the one after it.

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::{CanBus, CanFrame, FrameParseError};
+use super::{BusCondition, BusError, BusErrorKind, CanBus, CanFrame, FrameParseError};
 
 /// Longest line that is read, bytes: an FD frame with 64 bytes has under 200.
 const MAX_LINE: usize = 512;
@@ -126,6 +126,10 @@ impl<W: Write, B: CanBus> CanBus for CandumpWriter<W, B> {
     fn receive(&mut self) -> Result<Option<(u64, CanFrame)>, Self::Error> {
         self.bus.receive().map_err(LoggedBusError::Bus)
     }
+
+    fn condition(&self) -> BusCondition {
+        self.bus.condition()
+    }
 }
 
 impl<E: std::fmt::Display> std::fmt::Display for LoggedBusError<E> {
@@ -142,6 +146,15 @@ impl<E: std::error::Error + 'static> std::error::Error for LoggedBusError<E> {
         match self {
             Self::Bus(error) => Some(error),
             Self::Log(error) => Some(error),
+        }
+    }
+}
+
+impl<E: BusError + 'static> BusError for LoggedBusError<E> {
+    fn kind(&self) -> BusErrorKind {
+        match self {
+            Self::Bus(error) => error.kind(),
+            Self::Log(_) => BusErrorKind::Other,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{CanBus, CanFrame};
+use super::{BusCondition, CanBus, CanFrame};
 
 /// Spoils frames on their way to the bus behind: drops, repeats, corrupts or delays them, by chance from a seed.
 ///
@@ -164,6 +164,10 @@ impl<B: CanBus> CanBus for FaultInjector<B> {
 
     fn receive(&mut self) -> Result<Option<(u64, CanFrame)>, Self::Error> {
         self.bus.receive()
+    }
+
+    fn condition(&self) -> BusCondition {
+        self.bus.condition()
     }
 }
 

@@ -8,7 +8,7 @@ use fencepost_core::picture::Picture;
 use super::error::{RecordingError, RecordingWarning};
 use super::picture::{self, Converted, GreyPicture};
 use super::{RecordedFrame, Recording, picture_size};
-use crate::camera::{Camera, StereoPair};
+use crate::camera::{Camera, CameraError, CameraErrorKind, StereoPair};
 
 /// Delivers the pairs of a recording one after another.
 ///
@@ -65,6 +65,13 @@ impl RecordedCamera {
     }
 }
 
+/// A pair that cannot be read is one pair.
+impl CameraError for RecordingError {
+    fn kind(&self) -> CameraErrorKind {
+        CameraErrorKind::Damaged
+    }
+}
+
 impl Camera for RecordedCamera {
     type Error = RecordingError;
 
@@ -80,7 +87,7 @@ impl Camera for RecordedCamera {
         check_sizes(frame, [(&left_path, &left), (&right_path, &right)], &self.recording.calibration.stereo)?;
         let left = view(frame, &left_path, &left)?;
         let right = view(frame, &right_path, &right)?;
-        Ok(Some(consume(&StereoPair { left, right, timestamp_ns, sequence: frame })))
+        Ok(Some(consume(&StereoPair { left, right, timestamp_ns, skew_ns: 0, sequence: frame, missed: 0 })))
     }
 }
 

@@ -46,6 +46,6 @@ impl Camera for SceneCamera {
         // The options were checked and the pictures made to size: neither can fail, and a scene that ends is not wrong.
         let (Ok(left), Ok(right)) = (see(&pictures.left), see(&pictures.right)) else { return Ok(None) };
         let timestamp_ns = self.scene.timestamp_ns(sequence);
-        Ok(Some(consume(&StereoPair { left, right, timestamp_ns, sequence })))
+        Ok(Some(consume(&StereoPair { left, right, timestamp_ns, skew_ns: 0, sequence, missed: 0 })))
     }
 }

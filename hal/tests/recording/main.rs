@@ -101,7 +101,9 @@ fn put(writer: &mut RecordingWriter, frame: u64) -> Result<u32, RecordingError> 
         left: view(&left),
         right: view(&right),
         timestamp_ns: time_ns(frame),
+        skew_ns: 0,
         sequence: frame as u32,
+        missed: 0,
     })
 }
 

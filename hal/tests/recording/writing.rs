@@ -89,7 +89,9 @@ fn what_cannot_be_written_is_said_and_what_was_written_stays() {
     put(&mut writer, 0).unwrap();
     let pixels = vec![0; 100];
     let small = Picture::packed(&pixels, 10, 10).unwrap();
-    let error = writer.write_pair(&StereoPair { left: small, right: small, timestamp_ns: 0, sequence: 1 }).unwrap_err();
+    let error = writer
+        .write_pair(&StereoPair { left: small, right: small, timestamp_ns: 0, skew_ns: 0, sequence: 1, missed: 0 })
+        .unwrap_err();
     assert!(error.to_string().contains("10 x 10"), "{error}");
     // The place of the next picture is taken by a folder.
     fs::create_dir(other.join("image_1/000001.png")).unwrap();
