@@ -1,5 +1,11 @@
 //! Stereo cameras: whatever delivers pairs of pictures.
 
+mod memory;
+mod paced;
+
+pub use memory::MemoryCamera;
+pub use paced::PacedCamera;
+
 use fencepost_core::picture::Picture;
 
 /// A pair of pictures, lent for the time of one call.
