@@ -1,5 +1,12 @@
 //! Stereo cameras: whatever delivers pairs of pictures.
 
+mod format;
+pub mod pixels;
+mod settings;
+
+pub use format::PixelFormat;
+pub use settings::{CameraDevices, CameraSettings, CameraSettingsError, PackedLayout};
+
 use fencepost_core::picture::Picture;
 
 /// A pair of pictures, lent for the time of one call.
