@@ -1,17 +1,21 @@
-//! CAN buses: the trait, a bus in memory, and wrappers that log and spoil.
+//! CAN buses: the trait, the buses of Linux, a bus in memory, wrappers that log and spoil, and the queue towards a bus.
 //!
 //! ```text
-//! CandumpWriter<FaultInjector<VirtualNode>>     every layer is a CanBus and gives back what it wraps
+//! Transmitter<CandumpWriter<FaultInjector<VirtualNode>>>     every layer gives back what it wraps
+//!      │             └─────────────────┴───────────┴──────── all of these are a CanBus
+//!      └──────────────────────────────────────────────────── takes heartbeats and scans, and never waits
 //! ```
 
 mod candump;
 mod fault;
 mod frame;
+mod transmit;
 mod virtual_bus;
 
 pub use candump::{CandumpError, CandumpLine, CandumpProblem, CandumpWriter, LoggedBusError, parse_candump};
 pub use fault::{FaultCounts, FaultInjector};
 pub use frame::{CanFrame, FrameParseError};
+pub use transmit::{Pump, ScanTooLong, TransmitCounters, Transmitter};
 pub use virtual_bus::{VirtualBus, VirtualNode};
 
 /// What an error of a bus means for whoever sends.
