@@ -519,7 +519,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             progress.speed_m_s = self
                 .commands
                 .vehicle_motion(monotonic_ns())
-                .and_then(|motion| motion.speed_mm_s)
+                .and_then(|motion| motion.speed_mm_per_s)
                 .map(|speed| f32::from(speed) * 1.0e-3);
         }
     }

@@ -28,6 +28,7 @@ pub use bus::{BusReport, CommandReport, Progress, SentReport};
 pub use event::{Event, Severity};
 pub use latency::{Latency, LatencySummary};
 pub use pair::{PairPlan, PairReport};
+pub(crate) use realtime::check_cpu;
 pub use service::{Systemd, stop_at_signals};
 pub use settings::{BusSettings, MAX_PAIRS, RunSettings};
 
@@ -107,7 +108,7 @@ pub fn run<C, B>(
 ) -> Result<RunReport, Failure>
 where
     C: Camera + Send,
-    B: CanBus + Send,
+    B: CanBus<Error: Send> + Send,
 {
     let Plan { pairs, wire, settings } = plan;
     if pairs.is_empty() || pairs.len() > MAX_PAIRS {

@@ -21,8 +21,11 @@ impl ThreadWishes {
     }
 }
 
-/// Number of processors that the program may run on.
-pub(super) fn check_cpu(field: &'static str, cpu: u16) -> Result<(), ConfigError> {
+/// Whether there is such a processor.
+///
+/// # Errors
+/// Named `field`.
+pub(crate) fn check_cpu(field: &'static str, cpu: u16) -> Result<(), ConfigError> {
     let last = std::thread::available_parallelism().map_or(0, |count| count.get() - 1);
     ConfigError::check(field, f32::from(cpu), 0.0, last as f32)
 }
