@@ -313,6 +313,59 @@ fn no_cell_under_the_front_of_a_box_is_free() {
 }
 
 #[test]
+fn pairs_that_look_to_both_sides_make_one_map() {
+    // In the vehicle frame: a box on the left, one on the right, one ahead where both look.
+    let boxes = [([4.0, 2.5], [4.6, 3.4]), ([5.0, -4.0], [5.6, -3.0]), ([7.0, -0.5], [7.6, 0.5])];
+    let made = [(0.2, 0.4, 30.0), (0.2, -0.4, -30.0)].map(|place| {
+        let mut world = World { place, ..World::level(1.2, 12.0, 0.0) };
+        let ground = world.patches.len();
+        for (min, max) in boxes {
+            world.add_box([min[0], min[1], 0.0], [max[0], max[1], 1.0], 0.0);
+        }
+        // The world before a pair lies in the frame of the pair.
+        let (here, turn) = (world.clone(), |p| world.to_pair(p) - world.to_pair(Point::zeros()));
+        let patches = here.patches.iter().enumerate().map(|(i, patch)| match i < ground {
+            true => *patch,
+            false => Patch {
+                middle: world.to_pair(patch.middle),
+                half_a: turn(patch.half_a),
+                half_b: turn(patch.half_b),
+                ..*patch
+            },
+        });
+        let world = World { patches: patches.collect(), ..world.clone() };
+        make(&world, MapSettings::default(), &GroundSettings::default())
+    });
+    let mut merged = Box::new(Merged::<CELLS>::new());
+    for made in &made {
+        merged.add_parts(&made.map, made.ground.as_ref(), crate::health::Health::OK).unwrap();
+    }
+    let geometry = merged.map().geometry;
+    for (min, max) in boxes {
+        // The cell behind the middle of the face that looks at the vehicle, whoever sees it.
+        let at = ((min[0] + 0.05_f64) / 0.5, (min[1] + max[1]) / 2.0 / 0.5 + 0.1_f64);
+        let cell = merged.map().cells[geometry.index(at.0.floor() as i16, at.1.floor() as i16).unwrap()];
+        assert_eq!(cell.state, CellState::Obstacle, "box at {min:?}");
+    }
+    for (index, cell) in merged.map().cells.iter().enumerate() {
+        let [left, right] = made.each_ref().map(|made| made.map.cells[index].state);
+        assert!([left, right].contains(&cell.state));
+        let (i, j) = geometry.cell_at(index);
+        let (x, y) = (f64::from(i) * 0.5 + 0.25, f64::from(j) * 0.5 + 0.25);
+        let inside = boxes.iter().any(|(min, max)| x > min[0] && x < max[0] && y > min[1] && y < max[1]);
+        assert!(!(inside && cell.state == CellState::Free), "a box stands at {x}, {y}");
+    }
+    let free = |map: &ObstacleMap<CELLS>| count(map, CellState::Free);
+    let [left, right] = made.each_ref().map(|made| free(&made.map));
+    std::println!("free cells: {left} and {right}, together {}", free(merged.map()));
+    assert!(free(merged.map()) > left + 40 && free(merged.map()) > right + 40);
+    // One of them alone sees nothing on the other side.
+    let clear = merged.sectors(6.0).distance_dm.iter().filter(|d| **d != SECTOR_UNKNOWN).count();
+    let alone = SectorDistances::of(&made[0].map, 6.0).distance_dm.iter().filter(|d| **d != SECTOR_UNKNOWN).count();
+    assert!(clear > alone + 3, "{clear} sectors known, {alone} by one pair");
+}
+
+#[test]
 fn pictures_of_another_size_make_a_map_without_free_cells() {
     let world = scene();
     let made = make(&world, MapSettings::default(), &GroundSettings::default());
