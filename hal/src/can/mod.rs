@@ -9,12 +9,16 @@
 mod candump;
 mod fault;
 mod frame;
+#[cfg(target_os = "linux")]
+mod socket;
 mod transmit;
 mod virtual_bus;
 
 pub use candump::{CandumpError, CandumpLine, CandumpProblem, CandumpWriter, LoggedBusError, parse_candump};
 pub use fault::{FaultCounts, FaultInjector};
 pub use frame::{CanFrame, FrameParseError};
+#[cfg(target_os = "linux")]
+pub use socket::{BitTiming, CanInterface, IdFilter, SocketCan, SocketCanError, SocketCanProblem, can_interfaces};
 pub use transmit::{Pump, ScanTooLong, TransmitCounters, Transmitter};
 pub use virtual_bus::{VirtualBus, VirtualNode};
 
@@ -69,6 +73,8 @@ pub struct BusCondition {
     pub no_acknowledgement: u32,
     /// Errors on the bus and in the controller that it told of, those above among them.
     pub errors: u32,
+    /// Times that the controller gave way to another's frame, where it tells: that is how a bus is shared and no error.
+    pub lost_arbitrations: u32,
     /// Restarts after bus-off.
     pub restarts: u32,
     /// Frames of others that were lost because they were not fetched in time.
