@@ -1,6 +1,7 @@
 //! Stereo cameras: whatever delivers pairs of pictures.
 
 mod format;
+pub mod pairing;
 pub mod pixels;
 mod settings;
 
