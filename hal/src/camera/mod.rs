@@ -4,6 +4,8 @@ mod format;
 pub mod pairing;
 pub mod pixels;
 mod settings;
+#[cfg(all(feature = "v4l", target_os = "linux"))]
+pub mod v4l2;
 
 pub use format::PixelFormat;
 pub use settings::{CameraDevices, CameraSettings, CameraSettingsError, PackedLayout};

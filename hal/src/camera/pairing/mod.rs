@@ -36,7 +36,7 @@ pub struct Paired<T> {
     pub timestamp_ns: u64,
     /// Time of exposure of the right picture after that of the left one, nanoseconds.
     pub skew_ns: i64,
-    /// Number of the pair, from 0, with a gap for every moment of which one picture at least was lost.
+    /// Number of the pair, from 0, with a gap for every moment of which a picture was lost or passed over.
     pub sequence: u32,
     /// Pictures of both sides that were lost since the pair before.
     pub missed: u32,
@@ -51,6 +51,8 @@ pub struct PairingCounts {
     pub unpaired: u64,
     /// Pictures that never came, told by gaps in their numbers, or came damaged.
     pub lost: u64,
+    /// Pictures that were passed over because a newer one had come.
+    pub passed_over: u64,
     /// Times of exposure that were before the one of the same camera's last picture.
     pub jumps: u64,
     /// Numbers that began anew.
@@ -66,6 +68,8 @@ pub struct Pairing<T> {
     left: Stream<T>,
     right: Stream<T>,
     next: u32,
+    /// Pictures lost in front of a pair that turned out to be damaged.
+    carried: u32,
     counts: PairingCounts,
 }
 
@@ -76,6 +80,8 @@ struct Stream<T> {
     numbers: Sequence,
     /// Pictures lost since the last pair.
     lost: u32,
+    /// Pictures passed over since the last pair, or left without a partner by that.
+    passed_over: u32,
 }
 
 impl<T> Pairing<T> {
@@ -86,7 +92,8 @@ impl<T> Pairing<T> {
             left: Stream::new(),
             right: Stream::new(),
             next: 0,
-            counts: PairingCounts { pairs: 0, unpaired: 0, lost: 0, jumps: 0, restarts: 0, apart: 0 },
+            carried: 0,
+            counts: PairingCounts { pairs: 0, unpaired: 0, lost: 0, passed_over: 0, jumps: 0, restarts: 0, apart: 0 },
         }
     }
 
@@ -137,6 +144,21 @@ impl<T> Pairing<T> {
         stream.lost = stream.lost.saturating_add(1);
     }
 
+    /// Notes a good picture that is not wanted, since a newer one of its side has come. It is no loss.
+    pub fn pass_over(&mut self, side: Side, stamp: Stamp) {
+        self.note(side, stamp);
+        self.counts.passed_over += 1;
+        let stream = self.stream(side);
+        stream.passed_over = stream.passed_over.saturating_add(1);
+    }
+
+    /// Takes back a pair whose pictures turned out to be damaged: both are lost.
+    pub fn spoilt(&mut self, pair: &Paired<T>) {
+        self.counts.pairs = self.counts.pairs.saturating_sub(1);
+        self.counts.lost += 2;
+        self.carried = self.carried.saturating_add(pair.missed).saturating_add(2);
+    }
+
     /// Gives back what waits for a partner: too long, or in vain.
     pub fn release(&mut self, mut drop: impl FnMut(Side, T)) {
         for side in [Side::Left, Side::Right] {
@@ -180,26 +202,40 @@ impl<T> Pairing<T> {
     }
 
     fn unpaired(&mut self, side: Side) {
-        self.counts.unpaired += 1;
-        let stream = self.stream(side);
-        stream.lost = stream.lost.saturating_add(1);
+        let (own, other) = match side {
+            Side::Left => (&mut self.left, &self.right),
+            Side::Right => (&mut self.right, &self.left),
+        };
+        if other.passed_over > own.passed_over {
+            // Its partner was passed over.
+            self.counts.passed_over += 1;
+            own.passed_over += 1;
+        } else {
+            self.counts.unpaired += 1;
+            own.lost = own.lost.saturating_add(1);
+        }
     }
 
     fn pair(&mut self) -> Option<Paired<T>> {
         let ((timestamp_ns, left), (right_ns, right)) = self.left.held.take().zip(self.right.held.take())?;
-        let lost = [&mut self.left, &mut self.right].map(|stream| std::mem::take(&mut stream.lost));
-        let sequence = self.next.wrapping_add(lost[0].max(lost[1]));
+        let (mut gap, mut missed) = (0, std::mem::take(&mut self.carried));
+        for stream in [&mut self.left, &mut self.right] {
+            let lost = std::mem::take(&mut stream.lost);
+            gap = gap.max(lost.saturating_add(std::mem::take(&mut stream.passed_over)));
+            missed = missed.saturating_add(lost);
+        }
+        let sequence = self.next.wrapping_add(gap);
         self.next = sequence.wrapping_add(1);
         self.counts.pairs += 1;
         // No further apart than the tolerance, which is a fraction of a second.
         let skew_ns = right_ns.wrapping_sub(timestamp_ns).cast_signed();
-        Some(Paired { left, right, timestamp_ns, skew_ns, sequence, missed: lost[0].saturating_add(lost[1]) })
+        Some(Paired { left, right, timestamp_ns, skew_ns, sequence, missed })
     }
 }
 
 impl<T> Stream<T> {
     const fn new() -> Self {
-        Self { held: None, last_ns: None, numbers: Sequence::new(), lost: 0 }
+        Self { held: None, last_ns: None, numbers: Sequence::new(), lost: 0, passed_over: 0 }
     }
 }
 

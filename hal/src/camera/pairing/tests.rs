@@ -209,3 +209,43 @@ fn a_second_picture_of_a_side_takes_the_place_of_the_first() {
     assert_eq!(dropped, [0, 1, 2]);
     assert_eq!(pairing.push(Side::Left, stamp(3), 3, |_, _| ()).map(|pair| pair.missed), Some(3));
 }
+
+#[test]
+fn what_is_passed_over_is_no_loss_but_leaves_a_gap() {
+    let stamp = |moment: u64| Stamp { timestamp_ns: moment * PERIOD_NS, sequence: moment as u32 };
+    let mut pairing = Pairing::new(TOLERANCE_NS);
+    let mut dropped = Vec::new();
+    pairing.push(Side::Left, stamp(0), 0, |_, _| ());
+    assert!(pairing.push(Side::Right, stamp(0), 0, |_, _| ()).is_some());
+    // Three moments wait on the left, two on the right: the newest of each does not fit, the next one does.
+    pairing.pass_over(Side::Left, stamp(1));
+    pairing.pass_over(Side::Left, stamp(2));
+    assert!(pairing.push(Side::Left, stamp(3), 3, |_, moment| dropped.push(moment)).is_none());
+    pairing.pass_over(Side::Right, stamp(1));
+    assert!(pairing.push(Side::Right, stamp(2), 2, |_, moment| dropped.push(moment)).is_none());
+    let pair = pairing.push(Side::Right, stamp(3), 3, |_, _| ()).unwrap();
+    assert_eq!((pair.left, pair.right, pair.sequence, pair.missed), (3, 3, 3, 0));
+    assert_eq!(dropped, [2]);
+    assert_eq!((pairing.counts().passed_over, pairing.counts().unpaired, pairing.counts().lost), (4, 0, 0));
+    // A picture that is really missing is told beside those that were passed over.
+    pairing.pass_over(Side::Left, stamp(4));
+    pairing.push(Side::Left, stamp(5), 5, |_, _| ());
+    let pair = pairing.push(Side::Right, stamp(5), 5, |_, _| ()).unwrap();
+    assert_eq!((pair.sequence, pair.missed), (5, 1));
+}
+
+#[test]
+fn a_pair_that_is_spoilt_counts_as_lost_with_the_next_one() {
+    let stamp = |moment: u64| Stamp { timestamp_ns: moment * PERIOD_NS, sequence: moment as u32 };
+    let mut pairing = Pairing::new(TOLERANCE_NS);
+    for moment in [0, 2, 3] {
+        pairing.push(Side::Left, stamp(moment), moment, |_, _| ());
+        let pair = pairing.push(Side::Right, stamp(moment), moment, |_, _| ()).unwrap();
+        match moment {
+            2 => pairing.spoilt(&pair),
+            3 => assert_eq!((pair.sequence, pair.missed), (3, 4), "two pictures of moment 1, two of moment 2"),
+            _ => {}
+        }
+    }
+    assert_eq!((pairing.counts().pairs, pairing.counts().lost), (2, 4));
+}
