@@ -1,6 +1,8 @@
 //! Stereo cameras: whatever delivers pairs of pictures.
 
 mod format;
+mod memory;
+mod paced;
 pub mod pairing;
 pub mod pixels;
 mod settings;
@@ -8,6 +10,8 @@ mod settings;
 pub mod v4l2;
 
 pub use format::PixelFormat;
+pub use memory::MemoryCamera;
+pub use paced::PacedCamera;
 pub use settings::{CameraDevices, CameraSettings, CameraSettingsError, PackedLayout};
 
 use fencepost_core::picture::Picture;

@@ -26,7 +26,8 @@ use super::{
     Camera, CameraDevices, CameraError, CameraErrorKind, CameraSettings, CameraSettingsError, PackedLayout,
     PixelFormat, StereoPair,
 };
-use device::{Device, Frame, Taken, now_ns};
+use crate::clock::monotonic_ns;
+use device::{Device, Frame, Taken};
 
 /// Time between two attempts to open a device that is gone, nanoseconds.
 const RETRY_NS: u64 = 100_000_000;
@@ -132,7 +133,7 @@ impl V4l2Camera {
         if self.open.is_none() {
             let mut warnings = Vec::new();
             let opened = Open::new(&self.settings, [&self.left, &self.right], self.layout, &mut warnings);
-            self.retry_ns = now_ns().saturating_add(RETRY_NS);
+            self.retry_ns = monotonic_ns().saturating_add(RETRY_NS);
             let open = opened.map_err(|error| if self.opened_before { still_lost(error) } else { error })?;
             // What cannot be set was said the first time.
             if !std::mem::replace(&mut self.opened_before, true) {
@@ -145,7 +146,7 @@ impl V4l2Camera {
 
     /// Opens the devices if they are closed, no sooner than is sensible and no later than `deadline_ns`.
     fn ready(&mut self, deadline_ns: u64) -> Result<(), V4l2Error> {
-        let now_ns = now_ns();
+        let now_ns = monotonic_ns();
         if self.open.is_none() && now_ns < self.retry_ns {
             let until_ns = self.retry_ns.min(deadline_ns);
             std::thread::sleep(Duration::from_nanos(until_ns.saturating_sub(now_ns)));
@@ -182,7 +183,7 @@ impl V4l2Camera {
                 came[usize::from(side == Side::Right)] = true;
             }
             // A device that delivers pictures without partners must not hold the caller up.
-            if (pair.taken && now_ns() < deadline_ns) || (!pair.taken && open.wait(side, deadline_ns)?) {
+            if (pair.taken && monotonic_ns() < deadline_ns) || (!pair.taken && open.wait(side, deadline_ns)?) {
                 continue;
             }
             let problem = match came {
@@ -191,7 +192,7 @@ impl V4l2Camera {
             };
             let late = open.lens(side);
             let error = V4l2Error::new(&late.device.path, problem);
-            if now_ns().saturating_sub(late.device.alive_ns) > STALL_NS.max(20_000_000 * u64::from(timeout_ms)) {
+            if monotonic_ns().saturating_sub(late.device.alive_ns) > STALL_NS.max(20_000_000 * u64::from(timeout_ms)) {
                 self.close();
                 return Err(error);
             }
@@ -232,7 +233,7 @@ impl Camera for V4l2Camera {
     type Error = V4l2Error;
 
     fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, Self::Error> {
-        let deadline_ns = now_ns().saturating_add(1_000_000 * u64::from(self.settings.timeout_ms));
+        let deadline_ns = monotonic_ns().saturating_add(1_000_000 * u64::from(self.settings.timeout_ms));
         self.ready(deadline_ns)?;
         let result = self.wait_for_pair(deadline_ns).and_then(|pair| {
             let not_back = || V4l2Error::new(&self.left, V4l2Problem::NotBack);
