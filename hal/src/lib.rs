@@ -4,5 +4,6 @@
 pub mod calibration;
 pub mod camera;
 pub mod can;
+pub mod clock;
 pub mod recording;
 pub mod scene;

@@ -1,5 +1,16 @@
 //! Stereo cameras: whatever delivers pairs of pictures.
 
+mod format;
+mod memory;
+mod paced;
+pub mod pixels;
+mod settings;
+
+pub use format::PixelFormat;
+pub use memory::MemoryCamera;
+pub use paced::PacedCamera;
+pub use settings::{CameraDevices, CameraSettings, CameraSettingsError, PackedLayout};
+
 use fencepost_core::picture::Picture;
 
 /// A pair of pictures, lent for the time of one call.
