@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::{
     disparity::DisparityPicture,
     disparity::{DisparityPixel, Reason},
-    geometry::{DepthTable, Mount, Rays, RectifiedPair, VehicleFrame},
+    geometry::{DepthTable, Mount, Place, Rays, RectifiedPair, VehicleFrame},
     ground::{GroundFinder, GroundPlane, GroundSettings, Terrain},
     obstacles::{Obstacle, ObstacleFinder, ObstacleSettings},
     surfaces::{Regions, SurfaceSettings, Surfaces},
@@ -26,13 +26,15 @@ pub(crate) struct Patch {
     pub(crate) hole: Option<Reason>,
 }
 
-/// Patches before a camera.
+/// Patches before a camera, in the frame of the pair.
 #[derive(Clone, Debug)]
 pub(crate) struct World {
     pub(crate) pair: RectifiedPair,
     pub(crate) height_m: f64,
     pub(crate) pitch_down_deg: f64,
     pub(crate) roll_deg: f64,
+    /// Where the pair stands on the vehicle: metres ahead and to the left of its origin, and degrees to the left.
+    pub(crate) place: (f64, f64, f64),
     pub(crate) patches: Vec<Patch>,
 }
 
@@ -79,7 +81,7 @@ impl World {
 
     /// No patch at all.
     pub(crate) fn empty(height_m: f64, pitch_down_deg: f64, roll_deg: f64) -> Self {
-        Self { pair: PAIR, height_m, pitch_down_deg, roll_deg, patches: Vec::new() }
+        Self { pair: PAIR, height_m, pitch_down_deg, roll_deg, place: (0.0, 0.0, 0.0), patches: Vec::new() }
     }
 
     /// Adds a box that stands with its base at height `min[2]`, turned by `yaw_deg` about its middle.
@@ -158,11 +160,28 @@ impl World {
             height_m: Some(self.height_m as f32),
             pitch_down_deg: self.pitch_down_deg as f32,
             roll_deg: self.roll_deg as f32,
+            forward_m: self.place.0 as f32,
+            left_m: self.place.1 as f32,
+            yaw_left_deg: self.place.2 as f32,
         }
     }
 
+    /// A point of the pair's frame in that of the vehicle.
+    pub(crate) fn to_vehicle(&self, p: Point) -> Point {
+        let (forward_m, left_m, yaw_deg) = self.place;
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
+        turn * p + Point::new(forward_m, left_m, 0.0)
+    }
+
+    /// A point of the vehicle frame in that of the pair.
+    pub(crate) fn to_pair(&self, p: Point) -> Point {
+        let (forward_m, left_m, yaw_deg) = self.place;
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_deg.to_radians());
+        turn * (p - Point::new(forward_m, left_m, 0.0))
+    }
+
     pub(crate) fn frame(&self) -> VehicleFrame {
-        VehicleFrame::new(&self.mount()).unwrap()
+        VehicleFrame::new(&self.mount().without_place()).unwrap()
     }
 
     pub(crate) fn rays(&self) -> Rays {
@@ -190,12 +209,13 @@ pub(crate) struct Stages {
     pub(crate) depth: DepthTable<DISPARITIES>,
     pub(crate) rays: Rays,
     pub(crate) frame: VehicleFrame,
+    pub(crate) place: Place,
 }
 
 impl Stages {
     /// Stages that take `mount` for that of the camera.
     pub(crate) fn new(mount: &Mount, ground: &GroundSettings, obstacles: &ObstacleSettings) -> Self {
-        let frame = VehicleFrame::new(mount).unwrap();
+        let frame = VehicleFrame::new(&mount.without_place()).unwrap();
         let mut stages = Self {
             surfaces: Box::new(Surfaces::new()),
             regions: Box::new(Regions::new()),
@@ -204,6 +224,7 @@ impl Stages {
             depth: DepthTable::new(),
             rays: Rays::new(&PAIR, &frame),
             frame,
+            place: Place::new(mount),
         };
         stages.depth.configure(&PAIR, 0, DISPARITIES as u16);
         stages.surfaces.configure(&SurfaceSettings::default(), 320, 240).unwrap();
@@ -236,7 +257,8 @@ impl Stages {
         let terrain = self.terrain(ground);
         let mut obstacles = heapless::Vec::<_, OBSTACLES, u16>::new();
         let picture = DisparityPicture::new(pixels, 320);
-        let dropped = self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &mut obstacles);
+        let Self { surfaces, regions, place, .. } = self;
+        let dropped = self.obstacles.run(surfaces, regions, picture, &terrain, place, &mut obstacles);
         (ground, obstacles.to_vec(), dropped)
     }
 }

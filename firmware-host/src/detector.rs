@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::live::MAX_PAIRS;
 use fencepost_core::{detector::Detector, rectify::grid_nodes};
 
 /// Most pixels of a picture.
@@ -22,13 +23,19 @@ pub const CELLS: usize = 16384;
 /// The program's detector.
 pub type ProgramDetector = Detector<PIXELS, WIDTH, DISPARITIES, GRID, SURFACES, OBSTACLES, CELLS>;
 
-/// All zero until it is configured: pages that smaller pictures do not touch never become memory.
-static DETECTOR: Mutex<ProgramDetector> = Mutex::new(ProgramDetector::new());
+/// One for each pair of a rig. All zero until they are configured: pages that smaller pictures do not touch never become
+/// memory.
+static DETECTORS: [Mutex<ProgramDetector>; MAX_PAIRS] = [const { Mutex::new(ProgramDetector::new()) }; MAX_PAIRS];
 
-/// The detector, for one run at a time.
+/// The first detector, for one run at a time.
 pub fn lock() -> MutexGuard<'static, ProgramDetector> {
+    lock_one(0)
+}
+
+/// The detector of the pair `index`, below [`MAX_PAIRS`], for one run at a time.
+pub fn lock_one(index: usize) -> MutexGuard<'static, ProgramDetector> {
     // `configure` forgets everything, so what a run that panicked left behind does no harm.
-    DETECTOR.lock().unwrap_or_else(PoisonError::into_inner)
+    DETECTORS[index].lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Largest picture, for people.

@@ -22,6 +22,7 @@ pub mod config;
 pub mod console;
 pub mod detector;
 pub mod error;
+pub mod live;
 pub mod output;
 pub mod paint;
 pub mod pipeline;

@@ -195,7 +195,14 @@ pub fn mount_words(mount: &Mount) -> String {
         Some(height_m) => format!("{height_m:.2} m above the ground"),
         None => format!("height not known, {:.2} m assumed", Mount::ASSUMED_HEIGHT_M),
     };
-    format!("{height}, pitched down {:.1}°, rolled {:.1}°", mount.pitch_down_deg, mount.roll_deg)
+    let Mount { pitch_down_deg, roll_deg, forward_m, left_m, yaw_left_deg, .. } = mount;
+    let tilt = format!("{height}, pitched down {pitch_down_deg:.1}°, rolled {roll_deg:.1}°");
+    if mount.without_place() == *mount {
+        return tilt;
+    }
+    format!(
+        "{tilt}, {forward_m:.2} m ahead and {left_m:.2} m to the left of the origin, looking {yaw_left_deg:.1}° to the left"
+    )
 }
 
 /// The table for the terminal.

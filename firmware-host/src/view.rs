@@ -99,7 +99,7 @@ pub(crate) mod testing {
                 baseline_m: 0.12,
                 disparity_offset_px: 0.0,
             };
-            let mount = Mount { height_m: Some(1.0), pitch_down_deg: 15.0, roll_deg: 0.0 };
+            let mount = Mount { height_m: Some(1.0), pitch_down_deg: 15.0, ..Mount::default() };
             let mut made_up = Self {
                 left,
                 pixels,

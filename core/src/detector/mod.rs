@@ -11,7 +11,7 @@ pub use stage::{Probe, Stage};
 use crate::{
     disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
-    geometry::{DepthTable, Mount, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
+    geometry::{DepthTable, Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
     ground::{GroundFinder, GroundPlane, Terrain},
     health::{self, Exposure, HealthSettings, Signs},
     map::{MapBuilder, SectorDistances, View},
@@ -68,9 +68,13 @@ struct Setup {
     pair: RectifiedPair,
     /// Width and height of the left and the right picture as they arrive.
     picture_sizes: [(usize, usize); 2],
+    /// The left camera in the frame of the vehicle and in that of the pair, where everything is worked out.
+    vehicle_frame: VehicleFrame,
     frame: VehicleFrame,
+    place: Place,
     rays: Rays,
     nearest_m: f32,
+    sector_width_deg: f32,
 }
 
 impl<
@@ -116,10 +120,11 @@ impl<
     ) -> Result<(), ConfigError> {
         self.setup = None;
         self.detection.clear();
-        let frame = VehicleFrame::new(mount)?;
+        let frames = [VehicleFrame::new(mount)?, VehicleFrame::new(&mount.without_place())?];
         let pair = self.rectifier.configure(calibration)?;
         // The mount speaks of the left camera as it is; disparities are seen by the rectified one.
-        let frame = self.rectifier.rotation(Side::Left).map_or(frame, |rotation| frame.turned(rotation));
+        let rotation = self.rectifier.rotation(Side::Left);
+        let [vehicle_frame, frame] = frames.map(|frame| rotation.map_or(frame, |rotation| frame.turned(rotation)));
         let (width, height) = (pair.width as usize, pair.height as usize);
         self.surfaces.configure(&settings.surfaces, width, height)?;
         self.matcher.configure(&settings.matching, width, height)?;
@@ -135,7 +140,16 @@ impl<
         let largest = f32::from(min_disparity) + f32::from(disparities) - 2.0;
         let nearest_m = pair.distance_m(largest);
         let picture_sizes = [Side::Left, Side::Right].map(|side| self.rectifier.raw_size(side));
-        self.setup = Some(Setup { pair, picture_sizes, frame, rays: Rays::new(&pair, &frame), nearest_m });
+        self.setup = Some(Setup {
+            pair,
+            picture_sizes,
+            vehicle_frame,
+            frame,
+            place: Place::new(mount),
+            rays: Rays::new(&pair, &frame),
+            nearest_m,
+            sector_width_deg: settings.map.sector_width_deg,
+        });
         Ok(())
     }
 
@@ -180,15 +194,16 @@ impl<
 
         probe.enter(Stage::Obstacles);
         let detection = &mut self.detection;
+        let found = &mut detection.obstacles;
         detection.statistics.obstacles_dropped =
-            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &mut detection.obstacles);
+            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &setup.place, found);
 
         probe.enter(Stage::Map);
-        let Setup { pair, frame, rays, nearest_m, .. } = &setup;
-        let view = View { pair, frame, rays, depth: &self.depth, nearest_m: *nearest_m };
+        let Setup { pair, frame, place, rays, nearest_m, .. } = &setup;
+        let view = View { pair, frame, place, rays, depth: &self.depth, nearest_m: *nearest_m };
         self.map.run(&self.surfaces, picture, &view, &terrain, ground.is_some(), &mut detection.map);
-        detection.sectors = SectorDistances::of(&detection.map);
-        detection.ground = ground;
+        detection.sectors = SectorDistances::of(&detection.map, setup.sector_width_deg);
+        detection.ground = ground.map(|plane| plane.moved(place));
         detection.statistics.count(picture, report, self.surfaces.table(), &detection.map);
 
         probe.enter(Stage::Health);
@@ -287,9 +302,9 @@ impl<
         self.setup.as_ref().map(|setup| &setup.pair)
     }
 
-    /// Where the left camera sits; `None` before [`Self::configure`].
+    /// Where the left camera sits on the vehicle; `None` before [`Self::configure`].
     pub fn frame(&self) -> Option<&VehicleFrame> {
-        self.setup.as_ref().map(|setup| &setup.frame)
+        self.setup.as_ref().map(|setup| &setup.vehicle_frame)
     }
 
     /// Nearest distance along the optical axis that the disparity range reaches, metres; `None` before [`Self::configure`].

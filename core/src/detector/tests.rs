@@ -27,7 +27,8 @@ const PAIR: RectifiedPair = RectifiedPair {
     disparity_offset_px: 0.0,
 };
 
-const MOUNT: Mount = Mount { height_m: Some(0.6), pitch_down_deg: 10.0, roll_deg: 0.0 };
+const MOUNT: Mount =
+    Mount { height_m: Some(0.6), pitch_down_deg: 10.0, roll_deg: 0.0, forward_m: 0.0, left_m: 0.0, yaw_left_deg: 0.0 };
 
 fn settings() -> Settings {
     let geometry = MapGeometry { cell_size_mm: 250, x_first: 0, x_count: 20, y_first: -10, y_count: 20 };
@@ -174,7 +175,7 @@ fn the_same_frame_gives_the_same_bytes_again() {
     }
     let mut other = Box::new(Small::default());
     // What was configured before has no say.
-    let turned = Mount { height_m: None, pitch_down_deg: 30.0, roll_deg: 4.0 };
+    let turned = Mount { height_m: None, pitch_down_deg: 30.0, roll_deg: 4.0, yaw_left_deg: 60.0, ..MOUNT };
     other
         .configure(
             &Settings { map: settings().map, matching: settings().matching, ..Settings::default() },
@@ -310,6 +311,9 @@ fn extreme_calibrations_do_not_panic() {
             height_m: [None, Some(0.02), Some(20.0)][pick(&[0.0, 1.0, 2.0]) as usize],
             pitch_down_deg: pick(&[-60.0, 0.0, 89.0]),
             roll_deg: pick(&[-60.0, 0.0, 60.0]),
+            forward_m: pick(&[-50.0, 0.0, 50.0]),
+            left_m: pick(&[-50.0, 0.0, 50.0]),
+            yaw_left_deg: pick(&[-180.0, 0.0, 90.0, 180.0]),
         };
         let mut detector = Box::new(Small::new());
         detector.configure(&settings(), &StereoCalibration::Rectified(pair), &mount).unwrap();

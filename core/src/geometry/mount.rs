@@ -1,8 +1,9 @@
 //! How the left camera sits on the vehicle.
 
+use super::Place;
 use crate::error::ConfigError;
 
-/// Height and tilt of the left camera.
+/// Height, tilt and place of the left camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mount {
@@ -12,11 +13,20 @@ pub struct Mount {
     pub pitch_down_deg: f32,
     /// Roll about the optical axis, degrees; positive if the camera leans to the right.
     pub roll_deg: f32,
+    /// The left camera's place ahead of the origin of the vehicle frame, metres.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub forward_m: f32,
+    /// The left camera's place to the left of the origin of the vehicle frame, metres.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub left_m: f32,
+    /// Heading of the left camera against that of the vehicle, degrees, positive to the left.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub yaw_left_deg: f32,
 }
 
 impl Default for Mount {
     fn default() -> Self {
-        Self { height_m: None, pitch_down_deg: 0.0, roll_deg: 0.0 }
+        Self { height_m: None, pitch_down_deg: 0.0, roll_deg: 0.0, forward_m: 0.0, left_m: 0.0, yaw_left_deg: 0.0 }
     }
 }
 
@@ -33,7 +43,16 @@ impl Mount {
             ConfigError::check("mount.height_m", height_m, 0.02, 20.0)?;
         }
         ConfigError::check("mount.pitch_down_deg", self.pitch_down_deg, -60.0, 89.0)?;
-        ConfigError::check("mount.roll_deg", self.roll_deg, -60.0, 60.0)
+        ConfigError::check("mount.roll_deg", self.roll_deg, -60.0, 60.0)?;
+        ConfigError::check("mount.forward_m", self.forward_m, -50.0, 50.0)?;
+        ConfigError::check("mount.left_m", self.left_m, -50.0, 50.0)?;
+        ConfigError::check("mount.yaw_left_deg", self.yaw_left_deg, -180.0, 180.0)
+    }
+
+    /// The same camera at the origin, looking straight ahead: its own frame on the ground.
+    #[must_use]
+    pub const fn without_place(&self) -> Self {
+        Self { forward_m: 0.0, left_m: 0.0, yaw_left_deg: 0.0, ..*self }
     }
 }
 
@@ -42,7 +61,8 @@ impl Mount {
 pub struct VehicleFrame {
     /// Rows: the vehicle's x, y and z axes, seen in the camera frame.
     rows: [[f32; 3]; 3],
-    height_m: f32,
+    /// The camera, in the vehicle frame.
+    origin_m: [f32; 3],
 }
 
 impl VehicleFrame {
@@ -58,12 +78,15 @@ impl VehicleFrame {
         // then exchange the axes (camera z forward -> vehicle x, camera x right -> vehicle -y, camera y down -> vehicle -z).
         let right = [cos_roll, -sin_roll, 0.0];
         let down = [sin_roll, cos_roll, 0.0];
-        let rows = [
-            [-sin_pitch * down[0], -sin_pitch * down[1], cos_pitch],
-            [-right[0], -right[1], 0.0],
-            [-cos_pitch * down[0], -cos_pitch * down[1], -sin_pitch],
-        ];
-        Ok(Self { rows, height_m: mount.height_m.unwrap_or(Mount::ASSUMED_HEIGHT_M) })
+        let ahead = [-sin_pitch * down[0], -sin_pitch * down[1], cos_pitch];
+        let aside = [-right[0], -right[1], 0.0];
+        let up = [-cos_pitch * down[0], -cos_pitch * down[1], -sin_pitch];
+        // At last the heading, about the vehicle's z.
+        let place = Place::new(mount);
+        let turned = [0, 1, 2].map(|i| place.turn([ahead[i], aside[i]]));
+        let rows = [turned.map(|[x, _]| x), turned.map(|[_, y]| y), up];
+        let [x, y] = place.origin_m();
+        Ok(Self { rows, origin_m: [x, y, mount.height_m.unwrap_or(Mount::ASSUMED_HEIGHT_M)] })
     }
 
     /// The frame for a camera that was turned against the one that the mount speaks of: `rotation` takes directions of the
@@ -76,7 +99,12 @@ impl VehicleFrame {
 
     /// Height of the camera above the origin of the vehicle frame, metres.
     pub const fn camera_height_m(&self) -> f32 {
-        self.height_m
+        self.origin_m[2]
+    }
+
+    /// The camera in the vehicle frame, metres.
+    pub const fn origin_m(&self) -> [f32; 3] {
+        self.origin_m
     }
 
     /// The vehicle's x, y and z axes, seen in the camera frame.
@@ -93,7 +121,8 @@ impl VehicleFrame {
     /// Turns and moves a point.
     pub fn point(&self, camera_m: [f32; 3]) -> [f32; 3] {
         let [x, y, z] = self.direction(camera_m);
-        [x, y, z + self.height_m]
+        let origin = self.origin_m;
+        [x + origin[0], y + origin[1], z + origin[2]]
     }
 
     /// Turns a direction of the vehicle frame back into the camera frame.

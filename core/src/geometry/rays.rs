@@ -24,7 +24,7 @@ impl Rays {
     pub fn new(pair: &RectifiedPair, frame: &VehicleFrame) -> Self {
         let per_pixel = 1.0 / pair.focal_px;
         Self {
-            origin_m: [0.0, 0.0, frame.camera_height_m()],
+            origin_m: frame.origin_m(),
             along_row: frame.direction([per_pixel, 0.0, 0.0]),
             along_column: frame.direction([0.0, per_pixel, 0.0]),
             corner: frame.direction([-pair.cx * per_pixel, -pair.cy * per_pixel, 1.0]),

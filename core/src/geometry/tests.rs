@@ -12,7 +12,7 @@ use crate::{
 };
 
 fn frame(height_m: f32, pitch_down_deg: f32, roll_deg: f32) -> VehicleFrame {
-    VehicleFrame::new(&Mount { height_m: Some(height_m), pitch_down_deg, roll_deg }).unwrap()
+    VehicleFrame::new(&Mount { height_m: Some(height_m), pitch_down_deg, roll_deg, ..Mount::default() }).unwrap()
 }
 
 #[track_caller]
@@ -57,6 +57,8 @@ fn frames_are_those_of_rotations_about_the_vehicles_axes() {
     let mut random = Random::seeded("frames", 0x5eed_0120);
     for _ in 0..5000 {
         let world = World::empty(random.within(0.1, 5.0), random.within(-60.0, 89.0), random.within(-60.0, 60.0));
+        let place = (random.within(-9.0, 9.0), random.within(-9.0, 9.0), random.within(-180.0, 180.0));
+        let mounted = World { place, ..world.clone() };
         let frame = world.frame();
         let camera = Vector3::from_fn(|_, _| random.within(-10.0, 10.0));
         let truth = world.rotation() * camera + Vector3::new(0.0, 0.0, world.height_m);
@@ -65,6 +67,18 @@ fn frames_are_those_of_rotations_about_the_vehicles_axes() {
         let back = frame.to_camera(frame.direction(camera.map(|c| c as f32).into()));
         assert!((Vector3::from(back.map(f64::from)) - camera).norm() < 2.0e-5);
 
+        // The same camera elsewhere on the vehicle, by both ways: its frame, and the place that its own frame has.
+        let truth_moved = mounted.to_vehicle(truth);
+        let camera_f32: [f32; 3] = camera.map(|c| c as f32).into();
+        let found = VehicleFrame::new(&mounted.mount()).unwrap().point(camera_f32);
+        assert!((Vector3::from(found.map(f64::from)) - truth_moved).norm() < 5.0e-5);
+        let there = Place::new(&mounted.mount());
+        let [x, y, z] = frame.point(camera_f32);
+        let [x, y] = there.to_vehicle([x, y]);
+        assert!((Vector3::new(x, y, z).map(f64::from) - truth_moved).norm() < 5.0e-5);
+        let [x, y] = there.to_pair([x, y]);
+        assert!((Vector3::new(x, y, z).map(f64::from) - truth).norm() < 5.0e-5);
+
         // A camera turned against the mounted one: the same thing seen by both lies at the same place.
         let turn =
             Rotation3::from_euler_angles(random.within(-0.3, 0.3), random.within(-0.3, 0.3), random.within(-0.3, 0.3));
@@ -72,6 +86,30 @@ fn frames_are_those_of_rotations_about_the_vehicles_axes() {
         let found = frame.turned(&rotation).point((turn * camera).map(|c| c as f32).into());
         assert!((Vector3::from(found.map(f64::from)) - truth).norm() < 5.0e-5);
     }
+}
+
+#[test]
+fn a_pair_at_the_origin_leaves_every_bit() {
+    let mut random = Random::seeded("places", 0x5eed_0123);
+    let place = Place::new(&Mount::default());
+    assert_eq!(place, Place::ORIGIN);
+    for _ in 0..10_000 {
+        let point = [random.within(-99.0, 99.0) as f32, random.within(-99.0, 99.0) as f32];
+        for found in [place.to_vehicle(point), place.to_pair(point), place.turn(point), place.turn_back(point)] {
+            assert_eq!(found.map(f32::to_bits), point.map(f32::to_bits));
+        }
+    }
+    let mount = Mount { height_m: Some(1.3), pitch_down_deg: 17.0, roll_deg: -3.0, ..Mount::default() };
+    assert_eq!(VehicleFrame::new(&mount), VehicleFrame::new(&mount.without_place()));
+}
+
+#[test]
+fn a_camera_that_looks_to_the_left_sees_along_y() {
+    let mount = Mount { height_m: Some(1.0), forward_m: 2.0, left_m: -0.5, yaw_left_deg: 90.0, ..Mount::default() };
+    let frame = VehicleFrame::new(&mount).unwrap();
+    near(frame.point([0.0, 0.0, 4.0]), [2.0, 3.5, 1.0]);
+    near(frame.point([1.0, 0.0, 4.0]), [3.0, 3.5, 1.0]);
+    near(frame.to_camera([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
 }
 
 #[test]
@@ -168,13 +206,19 @@ fn what_cannot_be_is_named() {
     assert_eq!(problem(RectifiedPair { disparity_offset_px: 1.0e6, ..good }).field, "calibration.disparity_offset_px");
 
     let mount = |height_m, pitch_down_deg, roll_deg| {
-        VehicleFrame::new(&Mount { height_m, pitch_down_deg, roll_deg }).unwrap_err().field
+        VehicleFrame::new(&Mount { height_m, pitch_down_deg, roll_deg, ..Mount::default() }).unwrap_err().field
     };
     assert_eq!(mount(Some(0.0), 0.0, 0.0), "mount.height_m");
     assert_eq!(mount(Some(f32::NAN), 0.0, 0.0), "mount.height_m");
     assert_eq!(mount(None, 90.0, 0.0), "mount.pitch_down_deg");
     assert_eq!(mount(None, f32::NAN, 0.0), "mount.pitch_down_deg");
     assert_eq!(mount(None, 0.0, -61.0), "mount.roll_deg");
+    let place = |forward_m, left_m, yaw_left_deg| {
+        VehicleFrame::new(&Mount { forward_m, left_m, yaw_left_deg, ..Mount::default() }).unwrap_err().field
+    };
+    assert_eq!(place(51.0, 0.0, 0.0), "mount.forward_m");
+    assert_eq!(place(0.0, f32::NAN, 0.0), "mount.left_m");
+    assert_eq!(place(0.0, 0.0, 181.0), "mount.yaw_left_deg");
 }
 
 #[test]

@@ -1,8 +1,12 @@
 //! The ground as a plane.
 
-use crate::{geometry::VehicleFrame, planes::Scatter};
+use crate::{
+    geometry::{Place, VehicleFrame},
+    planes::Scatter,
+};
 
-/// The ground in the vehicle frame: points `p` with `normal . p = offset_m`.
+/// The ground: points `p` with `normal . p = offset_m`, in the frame of the pair as the stages work it out, in the vehicle
+/// frame as it leaves the detector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroundPlane {
     /// Unit normal, upward.
@@ -54,6 +58,15 @@ impl GroundPlane {
             rms_m: 0.0,
             age_frames: 0,
         }
+    }
+
+    /// The plane seen in the frame that the pair's frame is turned and moved into. What it says of the camera stays.
+    #[must_use]
+    pub fn moved(&self, place: &Place) -> Self {
+        let [x, y] = place.turn([self.normal[0], self.normal[1]]);
+        let normal = [x, y, self.normal[2]];
+        let [forward_m, left_m] = place.origin_m();
+        Self { normal, offset_m: self.offset_m + dot(normal, [forward_m, left_m, 0.0]), ..*self }
     }
 
     /// Height of a point of the vehicle frame above the plane, metres.

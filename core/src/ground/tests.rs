@@ -43,6 +43,7 @@ fn height_pitch_and_roll_are_told_though_the_mount_is_wrong() {
             height_m: (round % 3 > 0).then_some(height_m as f32),
             pitch_down_deg: (world.pitch_down_deg + random.within(-6.0, 6.0)) as f32,
             roll_deg: (world.roll_deg + random.within(-6.0, 6.0)) as f32,
+            ..Mount::default()
         };
         let plane = find(&world, &mount, &GroundSettings::default());
         let plane = plane.unwrap_or_else(|| panic!("round {round}: no ground, {world:?}, {mount:?}"));

@@ -4,7 +4,7 @@ use super::{Cell, CellState, MapSettings, ObstacleMap, UnknownReason, shadow};
 use crate::{
     disparity::{DisparityPicture, Reason},
     error::ConfigError,
-    geometry::{DepthTable, Rays, RectifiedPair, VehicleFrame},
+    geometry::{DepthTable, Place, Rays, RectifiedPair, VehicleFrame},
     ground::Terrain,
     surfaces::{Surface, SurfaceClass, Surfaces, TILE},
 };
@@ -14,9 +14,11 @@ use crate::{
 pub struct View<'a, const DISPARITIES: usize> {
     /// The rectified pair.
     pub pair: &'a RectifiedPair,
-    /// Where the left camera sits.
+    /// How the left camera sits in the frame of the pair.
     pub frame: &'a VehicleFrame,
-    /// Rays of the left camera.
+    /// Where the pair stands on the vehicle.
+    pub place: &'a Place,
+    /// Rays of the left camera, in the frame of the pair.
     pub rays: &'a Rays,
     /// Distances of the search range.
     pub depth: &'a DepthTable<DISPARITIES>,
@@ -108,7 +110,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             // Cannot fail: `configure` made sure that there is room.
             let _ = map.cells.push(cell);
         }
-        shadow::mark(map);
+        shadow::mark(map, view.place);
     }
 
     /// Collects the votes of one row of one tile.
@@ -146,8 +148,9 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
                 let z = view.depth.distance_m(pixel.steps());
                 let x = view.rays.origin_m[0] + z * direction[0];
                 let height = camera_height + z * climb - ground.lift_m(x);
-                let cell = (floor(x * per_cell), floor((view.rays.origin_m[1] + z * direction[1]) * per_cell));
-                if let Some(evidence) = self.settings.geometry.index(cell.0, cell.1).map(|i| &mut self.evidence[i]) {
+                let y = view.rays.origin_m[1] + z * direction[1];
+                let [i, j] = view.place.to_vehicle([x, y]).map(|metres| floor(metres * per_cell));
+                if let Some(evidence) = self.settings.geometry.index(i, j).map(|i| &mut self.evidence[i]) {
                     let too_high = height > self.settings.free_max_height_m;
                     match role {
                         Role::Obstacle | Role::Mixed if height >= min_height && height <= clearance => {
@@ -198,7 +201,8 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
     ) -> Cell {
         let geometry = self.settings.geometry;
         let (i, j) = geometry.cell_at(index);
-        let (x, y) = geometry.centre_m(i, j);
+        // Seen from the camera: what can be seen and told of a cell is a matter of where the pair is.
+        let [x, y] = view.place.to_pair(geometry.centre_m(i, j).into());
         let evidence = self.evidence[index];
         let unknown = |reason| Cell { state: CellState::Unknown(reason), ..Cell::default() };
         let seen = Sight::of_ground(x, y, view, ground);
@@ -250,7 +254,7 @@ struct Sight {
 }
 
 impl Sight {
-    /// Looks at the ground at `(x, y)` of the vehicle frame; `None` if it lies behind the camera.
+    /// Looks at the ground at `(x, y)` of the pair's frame; `None` if it lies behind the camera.
     fn of_ground<const DISPARITIES: usize>(
         x: f32,
         y: f32,

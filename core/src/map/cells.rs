@@ -25,6 +25,8 @@ pub enum UnknownReason {
     NoGround = 7,
     /// Left out because the map had no room.
     Dropped = 8,
+    /// Perhaps seen to be free, but in a picture that cannot be trusted.
+    NotTrusted = 9,
 }
 
 /// What is known of a cell.
@@ -47,6 +49,17 @@ pub struct Cell {
     pub pixels: u16,
     /// Height of the highest obstacle pixel above the ground, decimetres; 0 where there is none; saturates.
     pub height_dm: u8,
+}
+
+impl Cell {
+    /// The cell, unless it is free: then nothing is known of it.
+    #[must_use]
+    pub(crate) fn without_free(self) -> Self {
+        match self.state {
+            CellState::Free => Self { state: CellState::Unknown(UnknownReason::NotTrusted), ..Self::default() },
+            _ => self,
+        }
+    }
 }
 
 impl Default for Cell {
@@ -133,4 +146,11 @@ impl<const CELLS: usize> ObstacleMap<CELLS> {
         geometry: MapGeometry { cell_size_mm: 0, x_first: 0, x_count: 0, y_first: 0, y_count: 0 },
         cells: Vec::new(),
     };
+
+    /// Makes all free cells unknown, because the picture that they were seen in cannot be trusted. Obstacles stay.
+    pub(crate) fn withhold_free(&mut self) {
+        for cell in &mut self.cells {
+            *cell = cell.without_free();
+        }
+    }
 }

@@ -2,12 +2,14 @@
 
 mod builder;
 mod cells;
+mod merge;
 mod sectors;
 mod settings;
 mod shadow;
 
 pub use builder::{MapBuilder, View};
 pub use cells::{Cell, CellState, MapGeometry, ObstacleMap, UnknownReason};
+pub use merge::{Merged, OtherCells};
 pub use sectors::{SECTOR_CLEAR_DM, SECTOR_COUNT, SECTOR_UNKNOWN, SectorDistances};
 pub use settings::MapSettings;
 

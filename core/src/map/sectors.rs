@@ -24,7 +24,7 @@ pub struct SectorDistances {
 
 impl Default for SectorDistances {
     fn default() -> Self {
-        Self { left_deg: 50.0, width_deg: 5.0, distance_dm: [SECTOR_UNKNOWN; SECTOR_COUNT] }
+        Self::unknown(SectorDistances::WIDTH_DEG)
     }
 }
 
@@ -32,21 +32,30 @@ impl SectorDistances {
     /// All zero, for a map that was not made yet.
     pub(crate) const UNSET: Self = Self { left_deg: 0.0, width_deg: 0.0, distance_dm: [0; SECTOR_COUNT] };
 
-    /// The distances that a map holds.
+    /// Width of a sector unless somebody chose another, degrees: 50 degrees to either side, what a pair of cameras sees.
+    pub const WIDTH_DEG: f32 = 5.0;
+
+    /// Nothing seen in any direction. Sectors lie evenly around straight ahead; 18 degrees each are a full circle.
+    pub fn unknown(width_deg: f32) -> Self {
+        let left_deg = 0.5 * SECTOR_COUNT as f32 * width_deg;
+        Self { left_deg, width_deg, distance_dm: [SECTOR_UNKNOWN; SECTOR_COUNT] }
+    }
+
+    /// The distances that a map holds, by sectors of `width_deg`.
     ///
     /// A sector is clear if at least half of its cells in view were seen to be free and none is an obstacle.
     ///
     /// # Bound
     /// One pass over the cells.
-    pub fn of<const CELLS: usize>(map: &ObstacleMap<CELLS>) -> Self {
-        let mut sectors = Self::default();
+    pub fn of<const CELLS: usize>(map: &ObstacleMap<CELLS>, width_deg: f32) -> Self {
+        let mut sectors = Self::unknown(width_deg);
         let mut nearest_m = [f32::INFINITY; SECTOR_COUNT];
         let (mut free, mut in_view) = ([0u16; SECTOR_COUNT], [0u16; SECTOR_COUNT]);
         for (index, cell) in map.cells.iter().enumerate() {
             let (i, j) = map.geometry.cell_at(index);
             let (x, y) = map.geometry.centre_m(i, j);
             let place = (sectors.left_deg - libm::atan2f(y, x).to_degrees()) / sectors.width_deg;
-            if x <= 0.0 || place < 0.0 || place >= SECTOR_COUNT as f32 {
+            if place.is_nan() || place < 0.0 || place >= SECTOR_COUNT as f32 {
                 continue;
             }
             let place = place as usize;

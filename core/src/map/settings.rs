@@ -1,6 +1,6 @@
 //! Settings of the map.
 
-use super::MapGeometry;
+use super::{MapGeometry, SectorDistances};
 use crate::error::{ConfigError, ConfigProblem};
 
 /// Settings of the map.
@@ -23,8 +23,10 @@ pub struct MapSettings {
     /// Ground that lies off its plane by more than this, root mean square, metres, holds something that stands on it: its
     /// pixels are told by their own height.
     pub mixed_rms_m: f32,
-    /// Cells farther away are not told, metres.
+    /// Cells farther away from the camera are not told, metres.
     pub max_range_m: f32,
+    /// Width of each of the sectors around straight ahead, degrees; 18 is a full circle.
+    pub sector_width_deg: f32,
 }
 
 impl MapSettings {
@@ -38,6 +40,7 @@ impl MapSettings {
         free_max_height_m: 0.0,
         mixed_rms_m: 0.0,
         max_range_m: 0.0,
+        sector_width_deg: 0.0,
     };
 
     /// Checks every value. Cell numbers must fit the 7 bits that the wire has for them.
@@ -62,7 +65,8 @@ impl MapSettings {
         ConfigError::check("map.free_min_pixels", f32::from(self.free_min_pixels), 1.0, 10_000.0)?;
         ConfigError::check("map.free_max_height_m", self.free_max_height_m, 0.01, 2.0)?;
         ConfigError::check("map.mixed_rms_m", self.mixed_rms_m, 0.0, 2.0)?;
-        ConfigError::check("map.max_range_m", self.max_range_m, 0.1, 1000.0)
+        ConfigError::check("map.max_range_m", self.max_range_m, 0.1, 1000.0)?;
+        ConfigError::check("map.sector_width_deg", self.sector_width_deg, 0.5, 18.0)
     }
 }
 
@@ -77,6 +81,7 @@ impl Default for MapSettings {
             free_max_height_m: 0.2,
             mixed_rms_m: 0.03,
             max_range_m: 30.0,
+            sector_width_deg: SectorDistances::WIDTH_DEG,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Cells behind obstacles.
 
 use super::{CellState, ObstacleMap, UnknownReason};
+use crate::geometry::Place;
 
 /// Number of directions that are told apart.
 const DIRECTIONS: usize = 128;
@@ -8,32 +9,38 @@ const DIRECTIONS: usize = 128;
 /// Largest sideways distance per metre ahead that is looked at: 63 degrees to either side.
 const REACH: f32 = 2.0;
 
-/// Says of cells that were not seen that an obstacle hides them, if one lies in the same direction and nearer.
+/// Says of cells that were not seen that an obstacle hides them, if one lies in the same direction from the pair at `place` and
+/// nearer.
 ///
 /// # Bound
 /// Two passes over the cells, each with at most [`DIRECTIONS`] steps for an obstacle.
-pub(super) fn mark<const CELLS: usize>(map: &mut ObstacleMap<CELLS>) {
+pub(super) fn mark<const CELLS: usize>(map: &mut ObstacleMap<CELLS>, place: &Place) {
     let mut nearest_x = [f32::INFINITY; DIRECTIONS];
     let geometry = map.geometry;
     let half = 0.5 * geometry.cell_size_m();
-    let at = |index: usize| {
+    // Corners and middle of a cell, seen from the camera.
+    let at = |index: usize, dx: f32, dy: f32| {
         let (i, j) = geometry.cell_at(index);
-        geometry.centre_m(i, j)
+        let (x, y) = geometry.centre_m(i, j);
+        place.to_pair([x + dx, y + dy])
     };
     for (index, cell) in map.cells.iter().enumerate() {
-        let (x, y) = at(index);
-        if cell.state != CellState::Obstacle || x <= half {
+        if cell.state != CellState::Obstacle {
             continue;
         }
-        // The corners that lie farthest apart, seen from the camera.
-        let right = direction(y - half, if y > half { x + half } else { x - half });
-        let left = direction(y + half, if y < -half { x + half } else { x - half });
-        for nearest in &mut nearest_x[right.min(left)..=left.max(right)] {
+        let corners = [(-half, -half), (-half, half), (half, -half), (half, half)].map(|(dx, dy)| at(index, dx, dy));
+        if corners.iter().any(|[x, _]| *x <= 0.0) {
+            continue;
+        }
+        let [x, _] = at(index, 0.0, 0.0);
+        let directions = corners.map(|[x, y]| direction(y, x));
+        let (right, left) = directions.iter().fold((DIRECTIONS - 1, 0), |(low, high), &d| (low.min(d), high.max(d)));
+        for nearest in nearest_x.iter_mut().take(left + 1).skip(right) {
             *nearest = nearest.min(x);
         }
     }
     for (index, cell) in map.cells.iter_mut().enumerate() {
-        let (x, y) = at(index);
+        let [x, y] = at(index, 0.0, 0.0);
         let unseen = matches!(
             cell.state,
             CellState::Unknown(UnknownReason::LowTexture | UnknownReason::NoMatch | UnknownReason::TooFewPixels)

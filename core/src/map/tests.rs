@@ -5,6 +5,7 @@ use std::{boxed::Box, vec, vec::Vec};
 use super::*;
 use crate::{
     disparity::{DisparityPicture, DisparityPixel, Reason},
+    geometry::Place,
     ground::{GroundPlane, GroundSettings},
     obstacles::ObstacleSettings,
     surfaces::SurfaceClass,
@@ -44,7 +45,8 @@ fn make(world: &World, settings: MapSettings, ground_settings: &GroundSettings) 
 }
 
 fn view(stages: &Stages) -> View<'_, DISPARITIES> {
-    View { pair: &PAIR, frame: &stages.frame, rays: &stages.rays, depth: &stages.depth, nearest_m: nearest_m() }
+    let Stages { frame, place, rays, depth, .. } = stages;
+    View { pair: &PAIR, frame, place, rays, depth, nearest_m: nearest_m() }
 }
 
 /// Boxes, a wall without texture, a ditch of ambiguous matches and a low step on level ground.
@@ -77,8 +79,8 @@ fn plain_votes(world: &World, made: &Made) -> Vec<Votes> {
     let plane = terrain.plane();
     let normal = Point::from(plane.normal.map(f64::from));
     let size = f64::from(geometry.cell_size_mm) / 1000.0;
-    for (at, pixel) in made.pixels.iter().enumerate() {
-        let (u, v) = (at % 320, at / 320);
+    for (number, pixel) in made.pixels.iter().enumerate() {
+        let (u, v) = (number % 320, number / 320);
         let Some(surface) = made.stages.surfaces.surface_at(u, v) else { continue };
         let disparity = f64::from(pixel.steps()) / 16.0;
         let z = f64::from(PAIR.focal_px) * f64::from(PAIR.baseline_m) / disparity;
@@ -90,7 +92,8 @@ fn plain_votes(world: &World, made: &Made) -> Vec<Votes> {
         let limit = |h: f64| (height - h).abs() < near;
         let (min_height, clearance) = (0.25, 2.2);
         let free_max = f64::from(made.settings.free_max_height_m);
-        let uncertain = edge(p.x) || edge(p.y) || [min_height, clearance, free_max].into_iter().any(limit);
+        let at = world.to_vehicle(p);
+        let uncertain = edge(at.x) || edge(at.y) || [min_height, clearance, free_max].into_iter().any(limit);
         let range = f64::from(surface.points.mean_m[0]).hypot(f64::from(surface.points.mean_m[1]));
         let camera_height = normal.z * world.height_m - f64::from(plane.offset_m);
         let noise = 0.3 * camera_height * range / (f64::from(PAIR.focal_px) * f64::from(PAIR.baseline_m));
@@ -106,7 +109,7 @@ fn plain_votes(world: &World, made: &Made) -> Vec<Votes> {
             None
         };
         for (dx, dy) in [(0.0, 0.0), (near, near), (near, -near), (-near, near), (-near, -near)] {
-            let (i, j) = (((p.x + dx) / size).floor(), ((p.y + dy) / size).floor());
+            let (i, j) = (((at.x + dx) / size).floor(), ((at.y + dy) / size).floor());
             let Some(index) = geometry.index(i as i16, j as i16) else { continue };
             if uncertain {
                 // Counted at most once per shift, for every kind: generous.
@@ -144,8 +147,15 @@ fn plain_needs(world: &World, made: &Made, (x, y): (f64, f64)) -> Option<(f64, f
 
 #[test]
 fn cells_are_those_of_a_plain_count_of_votes() {
-    let worlds =
-        [scene(), { World { roll_deg: -6.0, pitch_down_deg: 20.0, ..scene() } }, World { height_m: 0.7, ..scene() }];
+    let worlds = [
+        scene(),
+        World { roll_deg: -6.0, pitch_down_deg: 20.0, ..scene() },
+        World { height_m: 0.7, ..scene() },
+        // Pairs that look to the side, mounted away from the origin: cells lie across their view.
+        World { place: (1.3, -0.4, 35.0), ..scene() },
+        World { place: (4.8, 3.1, -70.0), roll_deg: 3.0, ..scene() },
+        World { place: (12.0, -5.0, 170.0), ..scene() },
+    ];
     let small = MapGeometry { cell_size_mm: 250, x_first: 2, x_count: 50, y_first: -20, y_count: 50 };
     for (world, geometry) in worlds.iter().flat_map(|w| [(w, MapGeometry::default()), (w, small)]) {
         // A limit far from the few votes that rounding can move from cell to cell, so that most cells can be judged.
@@ -158,6 +168,8 @@ fn cells_are_those_of_a_plain_count_of_votes() {
             let (i, j) = geometry.cell_at(index);
             let size = f64::from(geometry.cell_size_mm) / 1000.0;
             let centre = ((f64::from(i) + 0.5) * size, (f64::from(j) + 0.5) * size);
+            let centre = world.to_pair(Point::new(centre.0, centre.1, 0.0));
+            let centre = (centre.x, centre.y);
             let needs = plain_needs(world, &made, centre);
             let what = std::format!("cell {i}, {j}: {cell:?}, votes {:?} to {:?}, {needs:?}", votes.least, votes.most);
             if centre.0.hypot(centre.1) > 14.0 + 1.0e-4 {
@@ -301,6 +313,59 @@ fn no_cell_under_the_front_of_a_box_is_free() {
 }
 
 #[test]
+fn pairs_that_look_to_both_sides_make_one_map() {
+    // In the vehicle frame: a box on the left, one on the right, one ahead where both look.
+    let boxes = [([4.0, 2.5], [4.6, 3.4]), ([5.0, -4.0], [5.6, -3.0]), ([7.0, -0.5], [7.6, 0.5])];
+    let made = [(0.2, 0.4, 30.0), (0.2, -0.4, -30.0)].map(|place| {
+        let mut world = World { place, ..World::level(1.2, 12.0, 0.0) };
+        let ground = world.patches.len();
+        for (min, max) in boxes {
+            world.add_box([min[0], min[1], 0.0], [max[0], max[1], 1.0], 0.0);
+        }
+        // The world before a pair lies in the frame of the pair.
+        let (here, turn) = (world.clone(), |p| world.to_pair(p) - world.to_pair(Point::zeros()));
+        let patches = here.patches.iter().enumerate().map(|(i, patch)| match i < ground {
+            true => *patch,
+            false => Patch {
+                middle: world.to_pair(patch.middle),
+                half_a: turn(patch.half_a),
+                half_b: turn(patch.half_b),
+                ..*patch
+            },
+        });
+        let world = World { patches: patches.collect(), ..world.clone() };
+        make(&world, MapSettings::default(), &GroundSettings::default())
+    });
+    let mut merged = Box::new(Merged::<CELLS>::new());
+    for made in &made {
+        merged.add_parts(&made.map, made.ground.as_ref(), crate::health::Health::OK).unwrap();
+    }
+    let geometry = merged.map().geometry;
+    for (min, max) in boxes {
+        // The cell behind the middle of the face that looks at the vehicle, whoever sees it.
+        let at = ((min[0] + 0.05_f64) / 0.5, (min[1] + max[1]) / 2.0 / 0.5 + 0.1_f64);
+        let cell = merged.map().cells[geometry.index(at.0.floor() as i16, at.1.floor() as i16).unwrap()];
+        assert_eq!(cell.state, CellState::Obstacle, "box at {min:?}");
+    }
+    for (index, cell) in merged.map().cells.iter().enumerate() {
+        let [left, right] = made.each_ref().map(|made| made.map.cells[index].state);
+        assert!([left, right].contains(&cell.state));
+        let (i, j) = geometry.cell_at(index);
+        let (x, y) = (f64::from(i) * 0.5 + 0.25, f64::from(j) * 0.5 + 0.25);
+        let inside = boxes.iter().any(|(min, max)| x > min[0] && x < max[0] && y > min[1] && y < max[1]);
+        assert!(!(inside && cell.state == CellState::Free), "a box stands at {x}, {y}");
+    }
+    let free = |map: &ObstacleMap<CELLS>| count(map, CellState::Free);
+    let [left, right] = made.each_ref().map(|made| free(&made.map));
+    std::println!("free cells: {left} and {right}, together {}", free(merged.map()));
+    assert!(free(merged.map()) > left + 40 && free(merged.map()) > right + 40);
+    // One of them alone sees nothing on the other side.
+    let clear = merged.sectors(6.0).distance_dm.iter().filter(|d| **d != SECTOR_UNKNOWN).count();
+    let alone = SectorDistances::of(&made[0].map, 6.0).distance_dm.iter().filter(|d| **d != SECTOR_UNKNOWN).count();
+    assert!(clear > alone + 3, "{clear} sectors known, {alone} by one pair");
+}
+
+#[test]
 fn pictures_of_another_size_make_a_map_without_free_cells() {
     let world = scene();
     let made = make(&world, MapSettings::default(), &GroundSettings::default());
@@ -387,7 +452,7 @@ fn cells_behind_obstacles_are_hidden_as_rays_say() {
     for round in 0..200 {
         let before = strewn(&mut random);
         let mut after = before.clone();
-        shadow::mark(&mut after);
+        shadow::mark(&mut after, &Place::ORIGIN);
         // Obstacles as the interval of sideways per ahead that their corners span.
         let shades: Vec<(f64, f64, f64)> = centres(&before)
             .filter(|&(x, _, state)| state == CellState::Obstacle && x > 0.25)
@@ -424,16 +489,17 @@ fn cells_behind_obstacles_are_hidden_as_rays_say() {
 #[test]
 fn sectors_are_those_of_a_plain_search() {
     let mut random = Random::seeded("sectors", 0x5eed_0152);
-    for round in 0..300 {
+    for (round, width_deg) in (0..300).zip([5.0, 18.0, 0.5, 7.0].into_iter().cycle()) {
         let map = strewn(&mut random);
-        let found = SectorDistances::of(&map);
-        assert_eq!((found.left_deg, found.width_deg), (50.0, 5.0));
+        let found = SectorDistances::of(&map, width_deg);
+        let width_deg = f64::from(width_deg);
+        assert_eq!((f64::from(found.left_deg), f64::from(found.width_deg)), (10.0 * width_deg, width_deg));
         for sector in 0..SECTOR_COUNT {
             let inside = |x: f64, y: f64| {
-                let place = (50.0 - y.atan2(x).to_degrees()) / 5.0;
+                let place = 10.0 - y.atan2(x).to_degrees() / width_deg;
                 // Centres on an edge belong to the sector on the right of it.
                 let place = if (place - place.round()).abs() < 1.0e-5 { place.round() } else { place.floor() };
-                x > 0.0 && place == sector as f64
+                place == sector as f64
             };
             let cells: Vec<_> = centres(&map).filter(|&(x, y, _)| inside(x, y)).collect();
             let nearest = cells.iter().filter(|c| c.2 == CellState::Obstacle).map(|c| c.0.hypot(c.1)).reduce(f64::min);
@@ -451,7 +517,7 @@ fn sectors_are_those_of_a_plain_search() {
         }
     }
     let empty = ObstacleMap::<CELLS>::EMPTY;
-    assert_eq!(SectorDistances::of(&empty).distance_dm, [SECTOR_UNKNOWN; SECTOR_COUNT]);
+    assert_eq!(SectorDistances::of(&empty, 5.0).distance_dm, [SECTOR_UNKNOWN; SECTOR_COUNT]);
 }
 
 #[test]
@@ -473,4 +539,5 @@ fn settings_that_cannot_be_are_named() {
     assert_eq!(field(MapSettings { free_min_pixels: 0, ..good }), "map.free_min_pixels");
     assert_eq!(field(MapSettings { free_max_height_m: 0.0, ..good }), "map.free_max_height_m");
     assert_eq!(field(MapSettings { max_range_m: f32::INFINITY, ..good }), "map.max_range_m");
+    assert_eq!(field(MapSettings { sector_width_deg: 18.5, ..good }), "map.sector_width_deg");
 }

@@ -4,11 +4,14 @@ mod settings;
 
 pub use settings::ObstacleSettings;
 
+use core::f32::consts::{FRAC_PI_2, PI};
+
 use heapless::Vec;
 
 use crate::{
     disparity::DisparityPicture,
     error::ConfigError,
+    geometry::Place,
     ground::Terrain,
     planes::{Scatter, SymmetricMatrix3},
     surfaces::{Regions, Surface, SurfaceClass, Surfaces},
@@ -80,7 +83,8 @@ impl ObstacleFinder {
         &self.settings
     }
 
-    /// Finds the obstacles, nearest first, and gives their surfaces their class. Heights are measured from `ground`. Where
+    /// Finds the obstacles of a pair at `place`, nearest first, and gives their surfaces their class. Heights are measured from
+    /// `ground`; the farthest that are joined are those from the camera, while the list tells them from the vehicle's origin. Where
     /// there is no room the farthest are left out of the list (their surfaces keep their class); returns how many.
     pub fn run<const PIXELS: usize, const SURFACES: usize, const OBSTACLES: usize>(
         &mut self,
@@ -88,6 +92,7 @@ impl ObstacleFinder {
         regions: &mut Regions<SURFACES>,
         picture: DisparityPicture<'_>,
         ground: &Terrain,
+        place: &Place,
         obstacles: &mut Vec<Obstacle, OBSTACLES, u16>,
     ) -> u32 {
         obstacles.clear();
@@ -98,12 +103,12 @@ impl ObstacleFinder {
             if !table.get(root).is_some_and(|surface| self.stands_up(surface, ground)) {
                 continue;
             }
-            let Some(obstacle) = self.measure(regions.members(root).filter_map(|place| table.get(place)), ground)
-            else {
+            let members = regions.members(root).filter_map(|place| table.get(place));
+            let Some(obstacle) = self.measure(members, ground, place) else {
                 continue;
             };
-            for place in regions.members(root) {
-                if let Some(surface) = surfaces.table_mut().get_mut(place) {
+            for member in regions.members(root) {
+                if let Some(surface) = surfaces.table_mut().get_mut(member) {
                     surface.class = SurfaceClass::Obstacle;
                 }
             }
@@ -129,17 +134,25 @@ impl ObstacleFinder {
     }
 
     /// The obstacle that the surfaces make, if they pass the thresholds.
-    fn measure<'a>(&self, members: impl Iterator<Item = &'a Surface>, ground: &Terrain) -> Option<Obstacle> {
+    fn measure<'a>(
+        &self,
+        members: impl Iterator<Item = &'a Surface>,
+        ground: &Terrain,
+        place: &Place,
+    ) -> Option<Obstacle> {
         let mut all = Scatter::default();
         let mut count = 0u16;
         let (mut min_m, mut max_m) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        // The box lies along the vehicle's axes.
+        let [ahead, aside] = [[1.0, 0.0], [0.0, 1.0]].map(|axis| place.turn_back(axis));
+        let axes = [[ahead[0], ahead[1], 0.0], [aside[0], aside[1], 0.0], ground.plane().normal];
         for surface in members {
             let points = &surface.points;
             all = all.joined(points);
             count = count.saturating_add(1);
             let height = ground.height_m(points.mean_m);
-            let middle = [points.mean_m[0], points.mean_m[1], height];
-            let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], ground.plane().normal];
+            let [x, y] = place.to_vehicle([points.mean_m[0], points.mean_m[1]]);
+            let middle = [x, y, height];
             for i in 0..3 {
                 let half = HALF_LENGTH * libm::sqrtf(points.variance_along(axes[i]));
                 min_m[i] = min_m[i].min(middle[i] - half);
@@ -147,11 +160,12 @@ impl ObstacleFinder {
             }
         }
         let (orientation_rad, length_m) = orientation(&all.covariance);
+        let [x, y] = place.to_vehicle([all.mean_m[0], all.mean_m[1]]);
         let obstacle = Obstacle {
-            mean_m: all.mean_m,
+            mean_m: [x, y, all.mean_m[2]],
             min_m,
             max_m,
-            orientation_rad,
+            orientation_rad: within_half_turn(orientation_rad + place.yaw_left_rad()),
             length_m,
             pixels: all.weight as u32,
             surfaces: count,
@@ -175,6 +189,16 @@ fn orientation(covariance: &SymmetricMatrix3) -> (f32, f32) {
     let radius = libm::sqrtf(half_difference * half_difference + b * b);
     let largest = (0.5 * (a + c) + radius).max(0.0);
     (0.5 * libm::atan2f(b, half_difference), 2.0 * HALF_LENGTH * libm::sqrtf(largest))
+}
+
+/// The direction of a line, which looks the same from both ends, in -pi/2 ..= pi/2.
+fn within_half_turn(angle_rad: f32) -> f32 {
+    let turned = angle_rad % PI;
+    match turned {
+        _ if turned > FRAC_PI_2 => turned - PI,
+        _ if turned < -FRAC_PI_2 => turned + PI,
+        _ => turned,
+    }
 }
 
 /// Inserts by distance; returns how many had to go.

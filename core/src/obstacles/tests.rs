@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     ground::GroundSettings,
     test_random::Random,
-    test_world::{Patch, Stages, World},
+    test_world::{Patch, Point, Stages, World},
 };
 
 fn find(world: &World, settings: &ObstacleSettings) -> Vec<Obstacle> {
@@ -97,6 +97,43 @@ fn panels_have_their_direction_and_length() {
 }
 
 #[test]
+fn elsewhere_on_the_vehicle_the_same_obstacles_are_moved_and_turned() {
+    let mut world = with_panel(panel(4.5, 0.3, 25.0, 2.0, 0.4, 0.8));
+    world.add_box([3.0, -1.6, 0.0], [3.6, -0.8, 0.9], 0.0);
+    let here = find(&world, &ObstacleSettings::default());
+    for place in [(1.5, -0.7, 0.0), (0.0, 0.0, 40.0), (-2.0, 1.0, -125.0), (0.3, 0.2, 180.0)] {
+        let mut there = find(&World { place, ..world.clone() }, &ObstacleSettings::default());
+        assert!(there.is_sorted_by_key(|obstacle| obstacle.distance_m()), "nearest to the vehicle's origin first");
+        // By size, so that they can be paired whatever their order.
+        let mut before = here.clone();
+        before.sort_by_key(|obstacle| obstacle.pixels);
+        there.sort_by_key(|obstacle| obstacle.pixels);
+        assert_eq!(before.len(), there.len());
+        for (a, b) in before.iter().zip(&there) {
+            let moved = World { place, ..world.clone() }.to_vehicle(a.mean_m.map(f64::from).into());
+            let off = (moved - Point::from(b.mean_m.map(f64::from))).norm();
+            let turned = f64::from(b.orientation_rad - a.orientation_rad).to_degrees() - place.2;
+            let turned = (turned + 90.0).rem_euclid(180.0) - 90.0;
+            assert!(off < 1.0e-4 && turned.abs() < 1.0e-2, "{place:?}: {a:?} became {b:?}");
+            assert!(b.orientation_rad.abs() <= core::f32::consts::FRAC_PI_2 + 1.0e-6);
+            assert_eq!((a.length_m, a.pixels, a.surfaces), (b.length_m, b.pixels, b.surfaces));
+            assert_eq!((a.min_m[2], a.max_m[2]), (b.min_m[2], b.max_m[2]));
+            // A box along other axes holds the same points: no farther than the corners of the first one.
+            let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(i, j)| {
+                let (x, y) = ([a.min_m[0], a.max_m[0]][i], [a.min_m[1], a.max_m[1]][j]);
+                World { place, ..world.clone() }.to_vehicle(Point::new(f64::from(x), f64::from(y), 0.0))
+            });
+            for axis in 0..2 {
+                let reach = |f: fn(f64, f64) -> f64, start| corners.iter().map(|c| c[axis]).fold(start, f);
+                assert!(b.min_m[axis] < b.mean_m[axis] && b.mean_m[axis] < b.max_m[axis]);
+                assert!(f64::from(b.min_m[axis]) > reach(f64::min, f64::MAX) - 0.1, "{place:?}: {a:?} became {b:?}");
+                assert!(f64::from(b.max_m[axis]) < reach(f64::max, f64::MIN) + 0.1, "{place:?}: {a:?} became {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn every_threshold_counts() {
     let world = with_panel(panel(3.5, 0.0, 0.0, 1.0, 0.5, 0.5));
     // Loose limits, so that each can be tried alone.
@@ -168,7 +205,7 @@ fn nearest_first_and_the_farthest_are_dropped_and_counted() {
     let of = |(_, obstacles, dropped): (_, Vec<Obstacle>, u32)| (obstacles, dropped);
     let (all, dropped) = run(&|stages| of(stages.run::<32>(&pixels)));
     assert_eq!((all.len(), dropped), (5, 0), "{all:?}");
-    assert!(all.is_sorted_by_key(Obstacle::distance_m));
+    assert!(all.is_sorted_by_key(|obstacle| obstacle.distance_m()));
     for (found, x) in all.iter().zip([3.0, 4.0, 5.0, 6.0, 7.0]) {
         assert!((found.mean_m[0] - x).abs() < 0.3, "{found:?} instead of {x}");
     }

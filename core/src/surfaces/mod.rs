@@ -44,9 +44,9 @@ pub enum SurfaceClass {
 /// One surface and the plane through it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// Its points in the vehicle frame; the weight is their number.
+    /// Its points in the frame of the pair; the weight is their number.
     pub points: Scatter,
-    /// Unit normal in the vehicle frame, upward; zero where no plane fits.
+    /// Unit normal in the frame of the pair, upward; zero where no plane fits.
     pub normal: [f32; 3],
     /// Root mean square distance of the points from the plane, metres.
     pub rms_m: f32,

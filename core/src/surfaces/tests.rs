@@ -80,7 +80,8 @@ fn depth() -> DepthTable<DISPARITIES> {
 }
 
 fn rays() -> Rays {
-    let mount = crate::geometry::Mount { height_m: Some(1.0), pitch_down_deg: 10.0, roll_deg: 3.0 };
+    let mount =
+        crate::geometry::Mount { height_m: Some(1.0), pitch_down_deg: 10.0, roll_deg: 3.0, ..Default::default() };
     Rays::new(&PAIR, &crate::geometry::VehicleFrame::new(&mount).unwrap())
 }
 

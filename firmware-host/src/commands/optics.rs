@@ -47,17 +47,17 @@ pub(super) fn range_m(pair: &RectifiedPair, matching: &MatchSettings) -> (f32, f
     (pair.distance_m(last - 2.0), pair.distance_m(first + 1.0))
 }
 
-/// Where the lowest row of the picture meets level ground straight ahead, metres from the camera; `None` if it does not.
+/// Where the lowest row of the picture meets level ground straight ahead of the camera, metres from the camera; `None` if it does not.
 pub(super) fn ground_begins_m(pair: &RectifiedPair, mount: &Mount) -> Option<f32> {
-    let frame = VehicleFrame::new(mount).ok()?;
+    let frame = VehicleFrame::new(&mount.without_place()).ok()?;
     let bottom = pair.height as f32 - 1.0;
     let [x, _, z] = frame.direction([0.0, (bottom - pair.cy) / pair.focal_px, 1.0]);
     (z < 0.0 && x > 0.0).then(|| x * frame.camera_height_m() / -z)
 }
 
-/// Where level ground straight ahead is far enough away for the disparity range, metres from the camera.
+/// Where level ground straight ahead of the camera is far enough away for the disparity range, metres from the camera.
 pub(super) fn ground_in_range_m(mount: &Mount, nearest_m: f32) -> Option<f32> {
-    let frame = VehicleFrame::new(mount).ok()?;
+    let frame = VehicleFrame::new(&mount.without_place()).ok()?;
     let [_, _, ahead_z] = frame.rows()[0].map(f64::from);
     let [_, _, up_z] = frame.rows()[2].map(f64::from);
     // Along the ground straight ahead, the distance along the optical axis is z(x) = x cos(pitch) + h sin(pitch).
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn the_ground_begins_where_the_lowest_row_meets_it() {
-        let mount = |pitch_down_deg| Mount { height_m: Some(1.0), pitch_down_deg, roll_deg: 0.0 };
+        let mount = |pitch_down_deg| Mount { height_m: Some(1.0), pitch_down_deg, ..Mount::default() };
         // Half the picture is 239.5 / 500 below the axis: level, 1 m up, that is 2.088 m away.
         assert!((ground_begins_m(&PAIR, &mount(0.0)).unwrap() - 500.0 / 239.5).abs() < 1.0e-3);
         let pitched = (20.0_f32.to_radians() + (239.5_f32 / 500.0).atan()).tan();
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn ground_in_range_lies_at_the_nearest_distance_along_the_axis() {
-        let mount = Mount { height_m: Some(1.0), pitch_down_deg: 30.0, roll_deg: 0.0 };
+        let mount = Mount { height_m: Some(1.0), pitch_down_deg: 30.0, ..Mount::default() };
         let x = ground_in_range_m(&mount, 1.5).unwrap();
         let (sin, cos) = 30.0_f32.to_radians().sin_cos();
         assert!((x * cos + 1.0 * sin - 1.5).abs() < 1.0e-4, "{x}");

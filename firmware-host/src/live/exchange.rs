@@ -49,8 +49,7 @@ pub(super) struct Place {
 
 impl Place {
     pub(super) fn new() -> Self {
-        let newest =
-            Newest { published: 0, exposure_ns: 0, missed: 0, detection: Detection::new(), trouble: None };
+        let newest = Newest { published: 0, exposure_ns: 0, missed: 0, detection: Detection::new(), trouble: None };
         Self { newest: Mutex::new(Box::new(newest)), alive: AtomicU64::new(0) }
     }
 
@@ -79,7 +78,7 @@ impl Place {
 }
 
 /// Copies without a table on the stack in between.
-fn copy(to: &mut Detection<OBSTACLES, CELLS>, from: &Detection<OBSTACLES, CELLS>) {
+pub(super) fn copy(to: &mut Detection<OBSTACLES, CELLS>, from: &Detection<OBSTACLES, CELLS>) {
     to.map.geometry = from.map.geometry;
     to.map.cells.clear();
     // Both tables have the same capacity.

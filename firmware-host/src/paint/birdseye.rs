@@ -155,6 +155,7 @@ fn paint_grid(canvas: &mut Canvas, scale: &Scale) {
 fn paint_field_of_view(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
     let pair = view.pair;
     let frame = scale.frame();
+    let [x, y, _] = view.vehicle.origin_m();
     for column in [0.0, pair.width as f32] {
         let ray = view.vehicle.direction([(column - pair.cx) / pair.focal_px, 0.0, 1.0]);
         let length = (ray[0] * ray[0] + ray[1] * ray[1]).sqrt();
@@ -165,7 +166,7 @@ fn paint_field_of_view(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>)
         let step_m = 0.5 / scale.px_per_m;
         for k in 0..8000 {
             let distance_m = k as f32 * step_m;
-            let at = scale.point(dx * distance_m, dy * distance_m);
+            let at = scale.point(x + dx * distance_m, y + dy * distance_m);
             if k % 24 < 14 && frame.contains(at) {
                 canvas.blend(at.x, at.y, VIEW, 0.9);
             }

@@ -3,8 +3,11 @@
 mod format;
 mod memory;
 mod paced;
+pub mod pairing;
 pub mod pixels;
 mod settings;
+#[cfg(all(feature = "v4l", target_os = "linux"))]
+pub mod v4l2;
 
 pub use format::PixelFormat;
 pub use memory::MemoryCamera;

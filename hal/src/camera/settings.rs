@@ -41,6 +41,10 @@ pub struct CameraSettings {
     /// Longest wait for a pair before it is missing, milliseconds.
     #[serde(default = "default_timeout_ms")]
     pub timeout_ms: u32,
+    /// Takes the newest pair and passes over older ones that wait, so that the pictures are never older than need be; with
+    /// `false` every pair is taken.
+    #[serde(default = "default_newest_only")]
+    pub newest_only: bool,
     /// Exposure time of both cameras, microseconds; turns their automatic exposure off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_us: Option<u32>,
@@ -188,6 +192,7 @@ impl CameraSettings {
             buffers: default_buffers(),
             pairing_tolerance_ms: default_pairing_tolerance_ms(),
             timeout_ms: default_timeout_ms(),
+            newest_only: default_newest_only(),
             exposure_us: None,
             gain: None,
         }
@@ -205,6 +210,10 @@ const fn default_pairing_tolerance_ms() -> f32 {
 
 const fn default_timeout_ms() -> u32 {
     100
+}
+
+const fn default_newest_only() -> bool {
+    true
 }
 
 impl core::fmt::Display for CameraSettingsError {

@@ -1,17 +1,25 @@
-//! CAN buses: the trait, a bus in memory, and wrappers that log and spoil.
+//! CAN buses: the trait, the buses of Linux, a bus in memory, wrappers that log and spoil, and the queue towards a bus.
 //!
 //! ```text
-//! CandumpWriter<FaultInjector<VirtualNode>>     every layer is a CanBus and gives back what it wraps
+//! Transmitter<CandumpWriter<FaultInjector<VirtualNode>>>     every layer gives back what it wraps
+//!      │             └─────────────────┴───────────┴──────── all of these are a CanBus
+//!      └──────────────────────────────────────────────────── takes heartbeats and scans, and never waits
 //! ```
 
 mod candump;
 mod fault;
 mod frame;
+#[cfg(target_os = "linux")]
+mod socket;
+mod transmit;
 mod virtual_bus;
 
 pub use candump::{CandumpError, CandumpLine, CandumpProblem, CandumpWriter, LoggedBusError, parse_candump};
 pub use fault::{FaultCounts, FaultInjector};
 pub use frame::{CanFrame, FrameParseError};
+#[cfg(target_os = "linux")]
+pub use socket::{BitTiming, CanInterface, IdFilter, SocketCan, SocketCanError, SocketCanProblem, can_interfaces};
+pub use transmit::{Pump, ScanTooLong, TransmitCounters, Transmitter};
 pub use virtual_bus::{VirtualBus, VirtualNode};
 
 /// What an error of a bus means for whoever sends.
@@ -65,6 +73,8 @@ pub struct BusCondition {
     pub no_acknowledgement: u32,
     /// Errors on the bus and in the controller that it told of, those above among them.
     pub errors: u32,
+    /// Times that the controller gave way to another's frame, where it tells: that is how a bus is shared and no error.
+    pub lost_arbitrations: u32,
     /// Restarts after bus-off.
     pub restarts: u32,
     /// Frames of others that were lost because they were not fetched in time.

@@ -8,6 +8,9 @@ use serde_json::Value;
 
 use super::error::{RecordingError, RecordingWarning};
 
+/// What a `mount.json` may say.
+const KEYS: [&str; 6] = ["height_m", "pitch_down_deg", "roll_deg", "forward_m", "left_m", "yaw_left_deg"];
+
 /// Reads `mount.json` in `folder`; null or absent is not known.
 pub(super) fn read(folder: &Path, warnings: &mut Vec<RecordingWarning>) -> Result<Mount, RecordingError> {
     let file = folder.join("mount.json");
@@ -40,18 +43,31 @@ pub(super) fn parse(file: &Path, bytes: &[u8], warnings: &mut Vec<RecordingWarni
     let height_m = number("height_m", "write metres, or null if it is not known")?;
     let pitch = number("pitch_down_deg", "write degrees below the horizon")?;
     let roll = number("roll_deg", "write degrees, positive to the right")?;
+    let forward = number("forward_m", "write metres ahead of the vehicle's origin")?;
+    let left = number("left_m", "write metres to the left of the vehicle's origin")?;
+    let yaw = number("yaw_left_deg", "write degrees, positive to the left")?;
     for (field, value) in [("pitch_down_deg", pitch), ("roll_deg", roll)] {
         if value.is_none() {
             warnings.push(RecordingWarning::TiltUnknown { file: file.to_owned(), field });
         }
     }
     for (key, value) in &map {
-        let known = matches!(key.as_str(), "height_m" | "pitch_down_deg" | "roll_deg");
-        if !known && value.is_number() && ["height", "pitch", "roll", "tilt"].iter().any(|word| key.contains(word)) {
+        let known = KEYS.contains(&key.as_str());
+        if !known
+            && value.is_number()
+            && ["height", "pitch", "roll", "tilt", "yaw", "forward", "left"].iter().any(|word| key.contains(word))
+        {
             warnings.push(RecordingWarning::MountKeyIgnored { file: file.to_owned(), key: key.clone() });
         }
     }
-    let mount = Mount { height_m, pitch_down_deg: pitch.unwrap_or(0.0), roll_deg: roll.unwrap_or(0.0) };
+    let mount = Mount {
+        height_m,
+        pitch_down_deg: pitch.unwrap_or(0.0),
+        roll_deg: roll.unwrap_or(0.0),
+        forward_m: forward.unwrap_or(0.0),
+        left_m: left.unwrap_or(0.0),
+        yaw_left_deg: yaw.unwrap_or(0.0),
+    };
     mount.check().map_err(|ConfigError { field, problem }| {
         let field = field.strip_prefix("mount.").unwrap_or(field);
         let mend = match problem {
@@ -63,9 +79,16 @@ pub(super) fn parse(file: &Path, bytes: &[u8], warnings: &mut Vec<RecordingWarni
     Ok(mount)
 }
 
-/// The text of a `mount.json`.
+/// The text of a `mount.json`; the place is left out where it is the origin, looking straight ahead.
 pub(super) fn emit(mount: &Mount) -> String {
     let height = mount.height_m.map_or("null".to_owned(), |height_m| format!("{height_m:?}"));
     let (pitch, roll) = (mount.pitch_down_deg, mount.roll_deg);
-    format!("{{\n \"height_m\": {height},\n \"pitch_down_deg\": {pitch:?},\n \"roll_deg\": {roll:?}\n}}\n")
+    let mut text = format!("{{\n \"height_m\": {height},\n \"pitch_down_deg\": {pitch:?},\n \"roll_deg\": {roll:?}");
+    if mount.without_place() != *mount {
+        let Mount { forward_m, left_m, yaw_left_deg, .. } = mount;
+        text += &format!(
+            ",\n \"forward_m\": {forward_m:?},\n \"left_m\": {left_m:?},\n \"yaw_left_deg\": {yaw_left_deg:?}"
+        );
+    }
+    text + "\n}\n"
 }

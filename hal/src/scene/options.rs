@@ -137,7 +137,8 @@ impl SceneOptions {
 
     /// How the left camera sits on the vehicle.
     pub fn mount(&self) -> Mount {
-        Mount { height_m: Some(self.mount_height_m), pitch_down_deg: self.pitch_down_deg, roll_deg: self.roll_deg }
+        let Self { mount_height_m, pitch_down_deg, roll_deg, .. } = *self;
+        Mount { height_m: Some(mount_height_m), pitch_down_deg, roll_deg, ..Mount::default() }
     }
 
     /// The exact calibration. With distortion or misalignment the pair is raw, and its rectified cameras are those of

@@ -13,7 +13,7 @@ fn mount_json_is_read_with_what_is_not_known_and_refused_with_what_is_wrong() {
 
     folder.write("mount.json", "{\"height_mm\": 950, \"roll_deg\": 1}");
     let recording = folder.open().unwrap();
-    assert_eq!(recording.mount, Mount { height_m: None, pitch_down_deg: 0.0, roll_deg: 1.0 });
+    assert_eq!(recording.mount, Mount { roll_deg: 1.0, ..Mount::default() });
     assert_eq!(
         recording.warnings,
         [
@@ -35,6 +35,9 @@ fn mount_json_is_read_with_what_is_not_known_and_refused_with_what_is_wrong() {
         ("{\"pitch_down_deg\": 95}", "pitch_down_deg"),
         ("{\"roll_deg\": true}", "roll_deg"),
         ("{\"roll_deg\": -1e9}", "roll_deg"),
+        ("{\"forward_m\": 1200}", "forward_m"),
+        ("{\"left_m\": [1]}", "left_m"),
+        ("{\"yaw_left_deg\": 270}", "yaw_left_deg"),
     ] {
         folder.write("mount.json", text);
         let error = folder.open().unwrap_err();

@@ -18,7 +18,14 @@ use image::{DynamicImage, ImageBuffer, Luma, LumaA, Rgb};
 
 const SIZE: (u32, u32) = (40, 24);
 const PERIOD_NS: u64 = 50_000_001;
-const MOUNT: Mount = Mount { height_m: Some(0.95), pitch_down_deg: 21.7, roll_deg: -0.3 };
+const MOUNT: Mount = Mount {
+    height_m: Some(0.95),
+    pitch_down_deg: 21.7,
+    roll_deg: -0.3,
+    forward_m: 0.0,
+    left_m: 0.0,
+    yaw_left_deg: 0.0,
+};
 
 /// A folder of its own for a test, gone at its end.
 struct Folder(PathBuf);

@@ -31,6 +31,20 @@ fn a_mount_that_is_not_known_stays_so() {
     let mut writer = RecordingWriter::create(&folder.0, &StereoCalibration::Rectified(rectified()), &mount).unwrap();
     put(&mut writer, 0).unwrap();
     assert_eq!(folder.open().unwrap().mount, mount);
+    assert!(
+        !fs::read_to_string(folder.join("mount.json")).unwrap().contains("yaw"),
+        "the place is said only if there is one"
+    );
+}
+
+#[test]
+fn a_mount_elsewhere_on_the_vehicle_is_read_again() {
+    let folder = Folder::new("mount-elsewhere");
+    let mount = Mount { forward_m: 1.5, left_m: -0.25, yaw_left_deg: -135.0, ..MOUNT };
+    let mut writer = RecordingWriter::create(&folder.0, &StereoCalibration::Rectified(rectified()), &mount).unwrap();
+    put(&mut writer, 0).unwrap();
+    let recording = folder.open().unwrap();
+    assert_eq!((recording.mount, recording.warnings), (mount, vec![]));
 }
 
 #[test]

@@ -8,7 +8,7 @@
 //!        │
 //!      boot ── QEMU: kvaser_pci x 2, ctucan_pci (CAN FD) ──> init ──> tests ──> exit status
 //!                                                                       │
-//!         modules, net, loopback, vivid: drive ── program: runs ── bus, resources: watch
+//!         modules, net, device, loopback, vivid: drive ── program: runs ── bus, resources: watch
 //! ```
 //! Everything that changes the machine goes through [`machine::run`], which refuses to work anywhere but in the guest. All
 //! helpers panic when they fail: they are for tests.
@@ -16,6 +16,7 @@
 #![deny(unsafe_code)]
 
 pub mod bus;
+pub mod device;
 pub mod loopback;
 pub mod machine;
 pub mod modules;

@@ -1,10 +1,15 @@
 //! The kernel's virtual video driver: two cameras with test patterns, whose faults can be ordered.
 
-use std::{collections::BTreeMap, path::Path, time::Duration};
+use std::{
+    collections::BTreeMap,
+    fs::{File, OpenOptions},
+    path::Path,
+    time::Duration,
+};
 
-use v4l::{
-    Control, Device,
-    control::{Type, Value},
+use v4l2r::{
+    bindings::v4l2_queryctrl,
+    ioctl::{self, CtrlId, QueryCtrlFlags},
 };
 
 use crate::{
@@ -60,9 +65,10 @@ impl Cameras {
 
 /// The controls of a camera by name, in lower case with words joined by `_`, as v4l2-ctl shows them:
 /// `inject_v4l2_buf_flag_error`, `percentage_of_dropped_buffers`, `disconnect`.
+#[derive(Debug)]
 pub struct Controls {
-    device: Device,
-    ids: BTreeMap<String, (u32, Type)>,
+    device: File,
+    ids: BTreeMap<String, u32>,
 }
 
 impl Controls {
@@ -71,27 +77,32 @@ impl Controls {
     /// # Panics
     /// When there is no such camera.
     pub fn of(path: &str) -> Self {
-        let device = Device::with_path(path).unwrap_or_else(|error| panic!("{path}: {error}"));
-        let controls = device.query_controls().unwrap_or_else(|error| panic!("{path}: {error}"));
-        let ids = controls.into_iter().map(|control| (plain_name(&control.name), (control.id, control.typ))).collect();
+        let device = OpenOptions::new().read(true).write(true).open(path);
+        let device = device.unwrap_or_else(|error| panic!("{path}: {error}"));
+        let mut ids = BTreeMap::new();
+        let mut last = 0;
+        // Each call tells the control after the last one.
+        while let Ok(control) = next_control(&device, last) {
+            let name = control.name.split(|byte| *byte == 0).next().unwrap_or_default();
+            ids.insert(plain_name(&String::from_utf8_lossy(name)), control.id);
+            last = control.id;
+        }
         Self { device, ids }
     }
 
-    /// Sets a control; presses it if it is a button.
+    /// Sets a control; presses it if it is a button. A menu takes the number of the entry.
     ///
     /// # Panics
     /// When there is no such control, or it does not take the value.
-    pub fn set(&self, name: &str, value: i64) {
-        let Some((id, kind)) = self.ids.get(name) else { panic!("no control {name}; there are {:?}", self.ids.keys()) };
-        let value = if *kind == Type::Boolean { Value::Boolean(value != 0) } else { Value::Integer(value) };
-        self.device.set_control(Control { id: *id, value }).unwrap_or_else(|error| panic!("{name}: {error}"));
+    pub fn set(&self, name: &str, value: i32) {
+        let Some(id) = self.ids.get(name) else { panic!("no control {name}; there are {:?}", self.ids.keys()) };
+        ioctl::s_ctrl(&self.device, *id, value).unwrap_or_else(|error| panic!("{name}: {error}"));
     }
 }
 
-impl std::fmt::Debug for Controls {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Controls").field("ids", &self.ids).finish_non_exhaustive()
-    }
+fn next_control(device: &File, last: u32) -> Result<v4l2_queryctrl, String> {
+    let last = CtrlId::new(last).map_err(|error| error.to_string())?;
+    ioctl::queryctrl(device, last, QueryCtrlFlags::NEXT).map_err(|error| error.to_string())
 }
 
 fn are_there() -> bool {

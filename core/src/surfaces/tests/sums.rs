@@ -38,6 +38,7 @@ fn mean_and_covariance_are_those_of_the_points() {
             height_m: Some(random.within(0.1, 3.0) as f32),
             pitch_down_deg: random.within(-30.0, 60.0) as f32,
             roll_deg: random.within(-30.0, 30.0) as f32,
+            ..Mount::default()
         };
         let frame = VehicleFrame::new(&mount).unwrap();
         let rays = Rays::new(&pair, &frame);

@@ -1,8 +1,16 @@
 //! The configuration: what a TOML file and the command line set, over defaults that serve every camera.
 
+mod mistake;
+mod rig;
+
+pub use mistake::Mistake;
+pub use rig::{RecordingSettings, Rig, RigPair, RigSource, SceneSettings, build_scene};
+
 use std::path::{Path, PathBuf};
 
+use crate::{cli::DetectorArgs, detector, error::Failure};
 use fencepost_core::{
+    error::ConfigError,
     geometry::Mount,
     ground::GroundSettings,
     health::HealthSettings,
@@ -12,11 +20,9 @@ use fencepost_core::{
     settings::Settings,
     surfaces::SurfaceSettings,
     validate::ValidateSettings,
-    wire::{FrameFormat, WireSettings},
+    wire::{FrameFormat, WireConfig, WireSettings},
 };
-use serde::Deserialize;
-
-use crate::{cli::DetectorArgs, error::Failure};
+use mistake::{Reader, Refused};
 
 /// Settings of the detector, of the mount and of the bus.
 #[derive(Clone, Debug, Default)]
@@ -29,24 +35,15 @@ pub struct Config {
     pub mount: Option<Mount>,
     /// The bus.
     pub wire: WireSettings,
+    /// The rig, if the file describes one.
+    pub rig: Rig,
     /// The file that it was read from.
     pub file: Option<PathBuf>,
 }
 
 /// The sections of a configuration file.
-#[derive(Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct Sections {
-    matching: MatchSettings,
-    validate: ValidateSettings,
-    surfaces: SurfaceSettings,
-    ground: GroundSettings,
-    obstacles: ObstacleSettings,
-    map: MapSettings,
-    health: HealthSettings,
-    mount: Option<Mount>,
-    wire: WireSettings,
-}
+const SECTIONS: [&str; 12] =
+    ["matching", "validate", "surfaces", "ground", "obstacles", "map", "health", "mount", "wire", "bus", "run", "pair"];
 
 impl Config {
     /// Reads the file that the command line names, if it names one, and puts the command line's own settings over it.
@@ -68,35 +65,100 @@ impl Config {
         Ok(config)
     }
 
-    /// Reads a configuration file.
+    /// Reads a configuration file without its rig: a recording can be replayed where there is no camera.
     ///
     /// # Errors
-    /// As [`Config::load`].
+    /// The first mistake of the file, and how many there are besides.
     pub fn read(path: &Path) -> Result<Self, Failure> {
+        Self::read_sections(path, false)
+    }
+
+    /// Reads a configuration file with its rig.
+    ///
+    /// # Errors
+    /// As [`Config::read`], and when there is no pair of cameras in it.
+    pub fn read_rig(path: &Path) -> Result<Self, Failure> {
+        let config = Self::read_sections(path, true)?;
+        if config.rig.pairs.is_empty() {
+            return Err(Failure::usage("the configuration has no pair of cameras")
+                .at(path.display().to_string())
+                .mend(
+                    "add [[pair]] with [pair.camera]; docs/deploy.md shows one, and `fencepost cameras` what is there",
+                ));
+        }
+        Ok(config)
+    }
+
+    fn read_sections(path: &Path, with_rig: bool) -> Result<Self, Failure> {
+        let (config, mistakes) = Self::read_all(path, with_rig)?;
+        let Some(first) = mistakes.first() else { return Ok(config) };
         let place = path.display().to_string();
+        let place = first.line.map_or_else(|| place.clone(), |line| format!("{place}, line {line}"));
+        let more = match mistakes.len() {
+            1 => String::new(),
+            count => format!(" (and {} mistakes more: `fencepost check {}` lists all)", count - 1, path.display()),
+        };
+        let field = if first.field.is_empty() { String::new() } else { format!("{} ", first.field) };
+        Err(Failure::usage(format!("the configuration cannot be used: {field}{}", first.problem))
+            .at(place)
+            .mend(format!("{}{more}", first.mend)))
+    }
+
+    /// Reads a configuration file and, `with_rig`, the files that it names, and tells every mistake in it, in the order of its
+    /// lines. What is mistaken has its default.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn read_all(path: &Path, with_rig: bool) -> Result<(Self, Vec<Mistake>), Failure> {
         let text = std::fs::read_to_string(path).map_err(|error| {
             Failure::usage(format!("the configuration cannot be read: {error}"))
-                .at(&place)
+                .at(path.display().to_string())
                 .mend("give the path of a TOML file that you may read: --config FILE")
         })?;
-        let wrong = |error: toml::de::Error| {
-            let line = error.span().map(|span| 1 + text.bytes().take(span.start).filter(|b| *b == b'\n').count());
-            let place = line.map_or_else(|| place.clone(), |line| format!("{place}, line {line}"));
-            Failure::usage(format!("the configuration does not say what a setting is: {}", error.message().trim()))
-                .at(place)
-                .mend("compare it with the list of settings in docs/files.md")
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let (mut config, mut mistakes) = Self::parse(&text, folder, with_rig);
+        config.file = Some(path.to_path_buf());
+        mistakes.sort_by_key(|mistake| mistake.line);
+        Ok((config, mistakes))
+    }
+
+    fn parse(text: &str, folder: &Path, with_rig: bool) -> (Self, Vec<Mistake>) {
+        let mut reader = Reader::new(text);
+        let root = reader.root();
+        reader.only(&root, &SECTIONS);
+        let checked = |check: Result<(), ConfigError>| check.err().map(Refused::of).into_iter().collect::<Vec<_>>();
+        macro_rules! section {
+            ($name:literal, $type:ty, $check:expr) => {
+                reader
+                    .section(&root, $name)
+                    .and_then(|section| reader.settings(&section, &[], |settings: &$type| checked(($check)(settings))))
+            };
+        }
+        let settings = Settings {
+            matching: section!("matching", MatchSettings, MatchSettings::check).unwrap_or_default(),
+            validate: section!("validate", ValidateSettings, ValidateSettings::check).unwrap_or_default(),
+            surfaces: section!("surfaces", SurfaceSettings, SurfaceSettings::check).unwrap_or_default(),
+            ground: section!("ground", GroundSettings, GroundSettings::check).unwrap_or_default(),
+            obstacles: section!("obstacles", ObstacleSettings, ObstacleSettings::check).unwrap_or_default(),
+            map: section!("map", MapSettings, |map: &MapSettings| map.check(detector::CELLS)).unwrap_or_default(),
+            health: section!("health", HealthSettings, HealthSettings::check).unwrap_or_default(),
         };
-        let table: toml::Table = text.parse().map_err(wrong)?;
-        let chose_disparities = table.get("matching").and_then(|section| section.get("disparities")).is_some();
-        let Sections { matching, validate, surfaces, ground, obstacles, map, health, mount, wire } =
-            toml::from_str(&text).map_err(wrong)?;
-        Ok(Self {
-            settings: Settings { matching, validate, surfaces, ground, obstacles, map, health },
-            disparities: chose_disparities.then_some(matching.disparities),
+        let mount = section!("mount", Mount, Mount::check);
+        let wire = section!("wire", WireSettings, |wire: &WireSettings| WireConfig::new(*wire).map(|_| ()))
+            .unwrap_or_default();
+        let chose_disparities = reader.section(&root, "matching").is_some_and(|section| section.has("disparities"));
+        let mut config = Self {
+            settings,
+            disparities: chose_disparities.then_some(settings.matching.disparities),
             mount,
             wire,
-            file: Some(path.to_path_buf()),
-        })
+            rig: Rig::default(),
+            file: None,
+        };
+        if with_rig {
+            config.rig = rig::read(&mut reader, &root, folder, |width| config.settings_for(width));
+        }
+        (config, reader.mistakes)
     }
 
     /// The settings for pictures of `width`: where nobody chose the number of disparities, an eighth of the width.
@@ -151,7 +213,7 @@ mod tests {
 
     #[test]
     fn every_setting_is_documented_with_its_default() {
-        let documented = include_str!("../../docs/files.md");
+        let documented = include_str!("../../../docs/files.md");
         let text = toml::to_string(&Settings::default()).unwrap();
         let mut section = String::new();
         for line in text.lines().filter(|line| !line.is_empty()) {

@@ -1,0 +1,553 @@
+//! The bus thread: joins what the pairs saw, says it on the bus, and listens to the vehicle's controller.
+
+use std::{
+    sync::{
+        Mutex,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    time::Duration,
+};
+
+use embedded_can::Id;
+use fencepost_core::{
+    health::{Health, HealthLevel, HealthReason},
+    wire::{
+        CellsRepr, Command, CommandReceiver, CommandStatistics, FIXED_FRAMES_PER_SCAN, Frame, HEARTBEAT_RATE_HZ,
+        NodeState, Scan, ScanEncoder, Status, WireConfig,
+    },
+};
+use fencepost_hal::{
+    can::{BusCondition, BusError, BusErrorKind, CanBus, ControllerState, Pump, TransmitCounters, Transmitter},
+    clock::monotonic_ns,
+};
+use heapless::Vec as FixedVec;
+use serde::Serialize;
+
+use super::{
+    event::{Events, Severity},
+    exchange::{Bell, Place, Trouble},
+    gather::{Gathered, PairView},
+    latency::{Latency, LatencySummary},
+    settings::{MAX_PAIRS, RunSettings},
+    watch::{EchoWatch, Watch, joined},
+};
+use crate::error::Failure;
+
+/// Most runs of cells in a scan: 255 frames of 8.
+const RUNS: usize = 255 * CellsRepr::FD_RUNS;
+const FRAMES: usize = 255 + FIXED_FRAMES_PER_SCAN;
+const HEARTBEAT_NS: u64 = 1_000_000_000 / HEARTBEAT_RATE_HZ as u64;
+/// News are said at once, but not more often than this.
+const NEWS_NS: u64 = 10_000_000;
+/// How often is looked for frames of others, and for room in a full queue.
+const LISTEN: Duration = Duration::from_millis(5);
+const RETRY: Duration = Duration::from_millis(1);
+/// Frames of others that are taken in one go.
+const LISTEN_FRAMES: usize = 256;
+/// How long the bus has for what still waits, and for the last heartbeat.
+const FAREWELL_NS: u64 = 100_000_000;
+
+/// What went over the bus, and how late.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct BusReport {
+    /// Scans encoded.
+    pub scans: u64,
+    /// Detections that a newer one of the same pair replaced before they could be sent.
+    pub overtaken: u64,
+    /// Scans whose last frame was handed over later than the deadline, or never.
+    pub late: u64,
+    /// From exposure to the last CAN frame.
+    pub latency: LatencySummary,
+    /// What became of heartbeats and scans.
+    #[serde(flatten)]
+    pub sent: SentReport,
+    /// Messages of the controller that were missing, repeated, damaged or refused.
+    pub commands: CommandReport,
+}
+
+/// Counts of frames.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct SentReport {
+    /// Frames that the bus took.
+    pub frames: u64,
+    /// Heartbeats among them.
+    pub heartbeats: u64,
+    /// Scans that the bus took whole.
+    pub whole_scans: u64,
+    /// Scans that were abandoned.
+    pub abandoned_scans: u64,
+    /// Times that the bus was full.
+    pub full: u64,
+    /// Times that the bus was down, gone or off.
+    pub no_bus: u64,
+}
+
+/// What was wrong with the controller's messages.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct CommandReport {
+    /// Missing by their counters.
+    pub lost: u32,
+    /// Came more than once.
+    pub repeated: u32,
+    /// Checksum did not fit.
+    pub crc_errors: u32,
+    /// Refused for another reason.
+    pub refused: u32,
+}
+
+/// What the bus thread last said, for whoever watches the loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Progress {
+    /// Scans encoded.
+    pub scans: u64,
+    /// Scans that came too late.
+    pub late: u64,
+    /// What was said last.
+    pub health: Health,
+    /// Time since exposure when the last scan was encoded, milliseconds.
+    pub age_ms: f64,
+    /// Speed of the vehicle, m/s, where the controller says it.
+    pub speed_m_s: Option<f32>,
+}
+
+/// What the bus thread shares with the others.
+pub(super) struct BusShared<'a> {
+    pub(super) places: &'a [Place],
+    pub(super) bell: &'a Bell,
+    pub(super) events: &'a Events,
+    pub(super) stop: &'a AtomicBool,
+    pub(super) progress: &'a Mutex<Progress>,
+    pub(super) alive: &'a AtomicU64,
+}
+
+/// The bus thread.
+pub(super) struct BusLoop<'a, B: CanBus> {
+    shared: BusShared<'a>,
+    settings: RunSettings,
+    encoder: Box<ScanEncoder<RUNS>>,
+    frames: Box<FixedVec<Frame, FRAMES>>,
+    transmitter: Transmitter<B>,
+    commands: CommandReceiver,
+    command_statistics: CommandStatistics,
+    motion_heard: bool,
+    echo: EchoWatch,
+    watch: Watch,
+    gathered: Gathered,
+    pairs: [PairState; MAX_PAIRS],
+    condition: BusCondition,
+    bus_trouble: Option<BusErrorKind>,
+    status: Status,
+    said: Health,
+    /// What the newest scan said of itself.
+    scan_health: Health,
+    next_heartbeat_ns: u64,
+    last_heartbeat_ns: u64,
+    start_ns: u64,
+    /// When the first of the detections came that are not sent yet.
+    first_fresh_ns: Option<u64>,
+    in_flight: Option<InFlight>,
+    latency: Latency,
+    report: BusReport,
+}
+
+/// What the bus thread knows of a pair.
+#[derive(Clone, Copy, Debug, Default)]
+struct PairState {
+    published: u64,
+    fresh: bool,
+    exposure_ns: Option<u64>,
+    trouble: Option<Trouble>,
+}
+
+/// The scan that is being sent.
+#[derive(Clone, Copy, Debug)]
+struct InFlight {
+    scan_index: u16,
+    exposure_ns: u64,
+}
+
+impl<'a, B: CanBus> BusLoop<'a, B> {
+    /// Takes all the memory that it will ever need.
+    ///
+    /// # Errors
+    /// When the settings ask for more cells than there is room for.
+    pub(super) fn new(
+        shared: BusShared<'a>,
+        bus: B,
+        wire: WireConfig,
+        settings: &RunSettings,
+    ) -> Result<Self, Failure> {
+        let encoder = ScanEncoder::new(wire).map_err(|error| Failure::config(error, None))?;
+        let ns = |ms: u32| u64::from(ms) * 1_000_000;
+        let now_ns = monotonic_ns();
+        let status = Status { state: NodeState::Starting, health: Health::default(), last_scan: None };
+        Ok(Self {
+            encoder: Box::new(encoder),
+            frames: Box::default(),
+            transmitter: Transmitter::new(bus, FRAMES),
+            commands: CommandReceiver::new(wire.address(), ns(settings.command_timeout_ms)),
+            command_statistics: CommandStatistics::default(),
+            motion_heard: settings.controller_required,
+            echo: EchoWatch::new(ns(settings.echo_timeout_ms), settings.controller_required),
+            watch: Watch::new(ns(settings.hold_ms)),
+            gathered: Gathered::new(),
+            pairs: [PairState::default(); MAX_PAIRS],
+            condition: BusCondition::default(),
+            bus_trouble: None,
+            status,
+            said: status.health,
+            scan_health: Health::default(),
+            next_heartbeat_ns: now_ns,
+            last_heartbeat_ns: 0,
+            start_ns: now_ns,
+            first_fresh_ns: None,
+            in_flight: None,
+            latency: Latency::new(),
+            report: BusReport::default(),
+            settings: settings.clone(),
+            shared,
+        })
+    }
+
+    /// Works until it is told to stop, or until no pair will see anything any more.
+    pub(super) fn run(mut self) -> BusReport {
+        loop {
+            let stopping = self.shared.stop.load(Ordering::Relaxed);
+            let now_ns = monotonic_ns();
+            self.listen(now_ns);
+            self.collect(now_ns);
+            let waiting = self.wait_for_others(now_ns);
+            if self.first_fresh_ns.is_some() && waiting.is_none() {
+                self.scan(now_ns);
+            }
+            self.judge(now_ns);
+            self.heartbeat_if_due(now_ns);
+            let pump = self.pump();
+            self.tell_progress();
+            self.shared.alive.fetch_add(1, Ordering::Relaxed);
+            let ended = self.pairs().all(|pair| pair.trouble == Some(Trouble::Ended) && !pair.fresh);
+            if stopping || ended {
+                break;
+            }
+            let until_heartbeat = Duration::from_nanos(self.next_heartbeat_ns.saturating_sub(monotonic_ns()));
+            let longest = if pump.waiting > 0 { RETRY } else { LISTEN };
+            self.shared.bell.wait(longest.min(until_heartbeat).min(waiting.unwrap_or(LISTEN)));
+        }
+        self.farewell();
+        self.finish()
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = &PairState> {
+        self.pairs.iter().take(self.shared.places.len())
+    }
+
+    /// Takes the frames that have arrived.
+    fn listen(&mut self, now_ns: u64) {
+        for _ in 0..LISTEN_FRAMES {
+            match self.transmitter.receive() {
+                Ok(None) => break,
+                Ok(Some((_, frame))) => {
+                    let Id::Standard(id) = frame.id() else { continue };
+                    // What is wrong with a message is in the statistics.
+                    match self.commands.receive(id, frame.data(), now_ns) {
+                        Ok(Command::VehicleMotion(_)) => self.motion_heard = true,
+                        Ok(Command::ScanEcho(echo)) => self.echo.echo(echo.scan_index, now_ns),
+                        Ok(Command::NotOurs | Command::Repeated) | Err(_) => {}
+                    }
+                }
+                Err(error) => {
+                    self.bus_trouble(error.kind(), &error, now_ns);
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Looks what is new at the pairs.
+    fn collect(&mut self, now_ns: u64) {
+        for (pair, place) in self.pairs.iter_mut().zip(self.shared.places) {
+            let newest = place.lock();
+            pair.trouble = newest.trouble;
+            if newest.published > pair.published {
+                let overtaken = newest.published - pair.published - 1 + u64::from(pair.fresh);
+                self.report.overtaken += overtaken;
+                pair.published = newest.published;
+                pair.exposure_ns = Some(newest.exposure_ns);
+                pair.fresh = true;
+                self.first_fresh_ns.get_or_insert(now_ns);
+                if newest.missed > 0 || overtaken > 0 {
+                    self.watch.see(HealthReason::MissingPicture, HealthLevel::Degraded, now_ns);
+                }
+            }
+        }
+    }
+
+    /// How long the pictures of one pair still wait for those of the others, so that one scan holds what was seen together.
+    fn wait_for_others(&self, now_ns: u64) -> Option<Duration> {
+        let waits = |pair: &PairState| !pair.fresh && pair.trouble.is_none() && pair.published > 0;
+        let longest = u64::from(self.settings.merge_wait_ms) * 1_000_000;
+        let waited = now_ns.saturating_sub(self.first_fresh_ns?);
+        let left = longest.saturating_sub(waited);
+        (left > 0 && self.pairs().any(waits)).then(|| Duration::from_nanos(left))
+    }
+
+    /// Joins what the pairs saw and hands it to the transmitter.
+    fn scan(&mut self, now_ns: u64) {
+        self.first_fresh_ns = None;
+        let stale_ns = u64::from(self.settings.stale_ms) * 1_000_000;
+        self.gathered.clear();
+        let mut oldest_ns = None;
+        for (pair, place) in self.pairs.iter_mut().zip(self.shared.places) {
+            pair.fresh = false;
+            let newest = place.lock();
+            let usable = newest.published > 0 && now_ns.saturating_sub(newest.exposure_ns) <= stale_ns;
+            // What a pair saw before it got into trouble is not mixed with what the others see now.
+            let view = match newest.trouble {
+                None | Some(Trouble::Ended) if usable => PairView::Seen(&newest.detection),
+                _ => PairView::Blind,
+            };
+            if matches!(view, PairView::Seen(_)) {
+                oldest_ns = Some(oldest_ns.map_or(newest.exposure_ns, |oldest: u64| oldest.min(newest.exposure_ns)));
+            }
+            self.gathered.add(&view);
+        }
+        let Some(exposure_ns) = oldest_ns else { return };
+
+        let age_ns = now_ns.saturating_sub(exposure_ns);
+        if age_ns > self.deadline_ns() {
+            self.watch.see(HealthReason::Late, HealthLevel::Degraded, now_ns);
+        }
+        let seen = self.gathered.detection();
+        // Counts the scans and not the frames: a gap would tell a receiver that it has missed something.
+        let scan_index = self.report.scans as u16;
+        self.scan_health = seen.health;
+        let scan = Scan {
+            scan_index,
+            age_ns,
+            health: joined(seen.health, self.watch.health(now_ns)),
+            geometry: &seen.map.geometry,
+            cells: &seen.map.cells,
+            sectors: &seen.sectors,
+            ground: seen.ground.as_ref(),
+        };
+        self.frames.clear();
+        // There is room for the frames of any scan.
+        let Ok(encoded) = self.encoder.encode(&scan, self.frames.as_mut_view()) else { return };
+        self.report.scans += 1;
+        if encoded.dropped_cells > 0 {
+            self.scan_health.raise(HealthReason::MapTruncated, HealthLevel::Degraded);
+        }
+        if self.in_flight.take().is_some() {
+            // It is abandoned now: no controller will ever have it.
+            self.late(now_ns);
+            self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
+        }
+        if self.transmitter.scan(&self.frames).is_ok() {
+            self.in_flight = Some(InFlight { scan_index, exposure_ns });
+        }
+        let first = self.status.last_scan.is_none();
+        self.status.state = NodeState::Running;
+        self.status.last_scan = Some(scan_index);
+        if first {
+            // A receiver takes no scan from a node that is not running: it hears at once that this one is.
+            self.next_heartbeat_ns = now_ns;
+        }
+        if let Ok(mut progress) = self.shared.progress.lock() {
+            progress.age_ms = age_ns as f64 * 1.0e-6;
+        }
+    }
+
+    fn deadline_ns(&self) -> u64 {
+        u64::from(self.settings.deadline_ms) * 1_000_000
+    }
+
+    fn late(&mut self, now_ns: u64) {
+        self.report.late += 1;
+        self.watch.see(HealthReason::Late, HealthLevel::Degraded, now_ns);
+    }
+
+    /// Everything that only the loop can know.
+    fn judge(&mut self, now_ns: u64) {
+        self.judge_pairs(now_ns);
+        self.judge_bus(now_ns);
+        self.judge_commands(now_ns);
+        self.status.health = joined(self.scan_health_now(), self.watch.health(now_ns));
+    }
+
+    /// Before the first scan nothing is known.
+    fn scan_health_now(&self) -> Health {
+        if self.status.last_scan.is_none() { Health::default() } else { self.scan_health }
+    }
+
+    fn judge_pairs(&mut self, now_ns: u64) {
+        let stale_ns = u64::from(self.settings.stale_ms) * 1_000_000;
+        let since_ns = |pair: &PairState| now_ns.saturating_sub(pair.exposure_ns.unwrap_or(self.start_ns));
+        let is_stale = |pair: &PairState| since_ns(pair) > stale_ns && pair.trouble != Some(Trouble::Ended);
+        // A rig that still sees something with one of its pairs is degraded; what the others do not see is unknown in its map.
+        let some_good = self.pairs().any(|pair| pair.trouble.is_none() && !is_stale(pair));
+        let limit = if some_good { HealthLevel::Degraded } else { HealthLevel::Fault };
+        let trouble = self.pairs().filter_map(|pair| pair.trouble).filter(|trouble| *trouble != Trouble::Ended);
+        let worst = trouble.map(Trouble::level).max();
+        let stale = self.pairs().any(is_stale);
+        if let Some(level) = worst {
+            self.watch.see(HealthReason::MissingPicture, level.min(limit), now_ns);
+        }
+        if stale {
+            self.watch.see(HealthReason::StalePicture, HealthLevel::Blind.min(limit), now_ns);
+        }
+    }
+
+    fn judge_bus(&mut self, now_ns: u64) {
+        let before = std::mem::replace(&mut self.condition, self.transmitter.bus().condition());
+        let now = self.condition;
+        let rose = now.errors > before.errors
+            || now.no_acknowledgement > before.no_acknowledgement
+            || now.restarts > before.restarts
+            || now.overflows > before.overflows;
+        if rose || now.controller >= ControllerState::ErrorPassive {
+            self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
+        }
+        if now.controller != before.controller {
+            let (severity, words) = match now.controller {
+                ControllerState::ErrorActive => (Severity::Note, "takes part in full again"),
+                ControllerState::Warning => (Severity::Warning, "counts many errors; look at cable, ends and bit rate"),
+                ControllerState::ErrorPassive => (
+                    Severity::Warning,
+                    "is error-passive; look at cable, ends, bit rate and whether another node is there",
+                ),
+                ControllerState::BusOff => {
+                    (Severity::Warning, "is off the bus; look at the cable, and set restart-ms so that it comes back")
+                }
+            };
+            self.shared.events.tell(now_ns, severity, format_args!("bus: the CAN controller {words}"));
+        }
+    }
+
+    fn judge_commands(&mut self, now_ns: u64) {
+        let before = std::mem::replace(&mut self.command_statistics, *self.commands.statistics());
+        let now = self.command_statistics;
+        let damaged = now.lost > before.lost || now.crc_errors > before.crc_errors || now.refused > before.refused;
+        let silent = self.motion_heard && self.commands.vehicle_motion(now_ns).is_none();
+        if damaged || silent {
+            self.watch.see(HealthReason::CommandTrouble, HealthLevel::Degraded, now_ns);
+        }
+        if self.echo.is_missing(now_ns) {
+            self.watch.see(HealthReason::EchoMissing, HealthLevel::Degraded, now_ns);
+        }
+    }
+
+    /// At 10 Hz, and at once when there are news.
+    fn heartbeat_if_due(&mut self, now_ns: u64) {
+        let news = self.status.health != self.said && now_ns.saturating_sub(self.last_heartbeat_ns) >= NEWS_NS;
+        if news || now_ns >= self.next_heartbeat_ns {
+            self.heartbeat(now_ns);
+        }
+    }
+
+    fn heartbeat(&mut self, now_ns: u64) {
+        let frame = self.encoder.heartbeat(&self.status);
+        self.transmitter.heartbeat(&frame);
+        self.said = self.status.health;
+        self.last_heartbeat_ns = now_ns;
+        self.next_heartbeat_ns = now_ns.saturating_add(HEARTBEAT_NS);
+    }
+
+    fn pump(&mut self) -> Pump {
+        let now_ns = monotonic_ns();
+        let pump = self.transmitter.pump(now_ns);
+        match pump.trouble {
+            // Full is nothing to worry about as long as the scan is through before the next one.
+            None | Some(BusErrorKind::Full) => {
+                if pump.sent > 0 && pump.trouble.is_none() {
+                    self.bus_good(now_ns);
+                }
+            }
+            Some(kind) => {
+                self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
+                self.say_bus_trouble(kind, now_ns);
+            }
+        }
+        if let (Some(finished), Some(flight)) = (pump.scan_finished, self.in_flight)
+            && flight.scan_index == finished
+        {
+            self.in_flight = None;
+            self.echo.sent(finished, now_ns);
+            let latency_ns = now_ns.saturating_sub(flight.exposure_ns);
+            self.latency.record(latency_ns);
+            if latency_ns > self.deadline_ns() {
+                self.late(now_ns);
+            }
+        }
+        pump
+    }
+
+    fn say_bus_trouble(&mut self, kind: BusErrorKind, now_ns: u64) {
+        if self.bus_trouble != Some(kind) {
+            self.bus_trouble = Some(kind);
+            match self.transmitter.error() {
+                Some(error) => {
+                    self.shared.events.tell(now_ns, Severity::Warning, format_args!("bus: {error}"));
+                }
+                None => {
+                    self.shared.events.tell(now_ns, Severity::Warning, format_args!("bus: nothing can be sent"));
+                }
+            }
+        }
+    }
+
+    /// The side that listens has found that something is wrong.
+    fn bus_trouble(&mut self, kind: BusErrorKind, error: &B::Error, now_ns: u64) {
+        self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
+        if self.bus_trouble != Some(kind) {
+            self.bus_trouble = Some(kind);
+            self.shared.events.tell(now_ns, Severity::Warning, format_args!("bus: {error}"));
+        }
+    }
+
+    fn bus_good(&mut self, now_ns: u64) {
+        if self.bus_trouble.take().is_some() {
+            self.shared.events.tell(now_ns, Severity::Note, format_args!("bus: frames go out again"));
+        }
+    }
+
+    fn tell_progress(&self) {
+        // Whoever looks at it never holds it for long.
+        if let Ok(mut progress) = self.shared.progress.try_lock() {
+            progress.scans = self.report.scans;
+            progress.late = self.report.late;
+            progress.health = self.status.health;
+            progress.speed_m_s = self
+                .commands
+                .vehicle_motion(monotonic_ns())
+                .and_then(|motion| motion.speed_mm_per_s)
+                .map(|speed| f32::from(speed) * 1.0e-3);
+        }
+    }
+
+    /// Sends what still waits, and then says that nothing more will come.
+    fn farewell(&mut self) {
+        self.drain();
+        self.status.state = NodeState::Stopping;
+        self.heartbeat(monotonic_ns());
+        self.drain();
+    }
+
+    fn drain(&mut self) {
+        let end_ns = monotonic_ns().saturating_add(FAREWELL_NS);
+        while self.pump().waiting > 0 && monotonic_ns() < end_ns {
+            std::thread::sleep(RETRY);
+        }
+    }
+
+    fn finish(self) -> BusReport {
+        let TransmitCounters { frames, heartbeats, scans, abandoned_scans, full, no_bus, .. } =
+            *self.transmitter.counters();
+        let CommandStatistics { lost, repeated, crc_errors, refused } = *self.commands.statistics();
+        BusReport {
+            latency: self.latency.summary(),
+            sent: SentReport { frames, heartbeats, whole_scans: scans, abandoned_scans, full, no_bus },
+            commands: CommandReport { lost, repeated, crc_errors, refused },
+            ..self.report
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The live loop: cameras in, CAN out, for weeks.
+//!
+//! ```text
+//!  camera ──> pair thread ──> place ─┐
+//!             detector               ├──> bus thread ──> transmitter ──> bus
+//!  camera ──> pair thread ──> place ─┘    joins, encodes,     ^
+//!             detector                    heartbeats          └── never waits
+//!                  │                          │
+//!                  └────> events, progress <──┘ ──> main thread: console, systemd
+//! ```
+//! A thread for each pair of cameras waits for pictures and looks at them; what it saw lies in its *place*, the newest only.
+//! The bus thread is woken by each of them, joins what the pairs saw into one map, and says it on the bus. It also sends the
+//! heartbeats, whatever the cameras do. After the start no thread of the loop takes memory from the heap; texts for people
+//! wait in a table of fixed size until the main thread says them.
+
+mod bus;
+mod event;
+mod exchange;
+mod gather;
+mod latency;
+mod pair;
+mod realtime;
+mod service;
+mod settings;
+mod watch;
+
+pub use bus::{BusReport, CommandReport, Progress, SentReport};
+pub use event::{Event, Severity};
+pub use latency::{Latency, LatencySummary};
+pub use pair::{PairPlan, PairReport};
+pub(crate) use realtime::check_cpu;
+pub use service::{Systemd, stop_at_signals};
+pub use settings::{BusSettings, MAX_PAIRS, RunSettings};
+
+use std::{
+    sync::{
+        Barrier, Mutex,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+        mpsc,
+    },
+    thread,
+    time::Duration,
+};
+
+use fencepost_core::{geometry::StereoCalibration, wire::WireConfig};
+use fencepost_hal::{camera::Camera, can::CanBus};
+use serde::Serialize;
+
+use crate::{detector, error::Failure};
+use bus::{BusLoop, BusShared};
+use event::Events;
+use exchange::{Bell, Place};
+use pair::PairLoop;
+use realtime::ThreadWishes;
+
+/// How often the main thread says what has happened, and looks whether the others live.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// A rig that is about to run.
+#[derive(Clone, Debug)]
+pub struct Plan<C> {
+    /// The pairs of cameras, one to [`MAX_PAIRS`].
+    pub pairs: Vec<PairPlan<C>>,
+    /// Node and format on the bus.
+    pub wire: WireConfig,
+    /// Deadlines and time-outs.
+    pub settings: RunSettings,
+}
+
+/// What the main thread sees of the loop.
+#[derive(Debug)]
+pub enum Observation<'a> {
+    /// The operating system refused something; the loop runs without it.
+    Refused(&'a str),
+    /// All threads run.
+    Started,
+    /// Something happened.
+    Event(&'a Event),
+    /// How it goes; `alive` tells whether every thread has moved since the last time.
+    Look {
+        /// What the bus thread last said.
+        progress: Progress,
+        /// Whether every thread has moved.
+        alive: bool,
+    },
+}
+
+/// How a run went.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct RunReport {
+    /// Each pair of cameras.
+    pub pairs: Vec<PairReport>,
+    /// The bus.
+    pub bus: BusReport,
+    /// Events that could not be said because there were too many.
+    pub events_dropped: u64,
+}
+
+/// Runs the loop until `stop` is set or no camera will deliver any more. `observe` is called by the calling thread.
+///
+/// # Errors
+/// When a calibration, a mount or a setting cannot be used. Nothing was sent then.
+pub fn run<C, B>(
+    plan: Plan<C>,
+    bus: B,
+    stop: &AtomicBool,
+    mut observe: impl FnMut(Observation<'_>),
+) -> Result<RunReport, Failure>
+where
+    C: Camera + Send,
+    B: CanBus<Error: Send> + Send,
+{
+    let Plan { pairs, wire, settings } = plan;
+    if pairs.is_empty() || pairs.len() > MAX_PAIRS {
+        return Err(Failure::usage(format!("a rig has 1 to {MAX_PAIRS} pairs of cameras, not {}", pairs.len())));
+    }
+    if settings.lock_memory
+        && let Err(refused) = realtime::lock_memory()
+    {
+        observe(Observation::Refused(&refused));
+    }
+    let places: Vec<Place> = pairs.iter().map(|_| Place::new()).collect();
+    let names: Vec<String> = pairs.iter().map(|pair| pair.name.clone()).collect();
+    let (bell, events, progress, bus_alive) = (Bell::default(), Events::default(), Mutex::default(), AtomicU64::new(0));
+    let shared =
+        BusShared { places: &places, bell: &bell, events: &events, stop, progress: &progress, alive: &bus_alive };
+    let bus_loop = BusLoop::new(shared, bus, wire, &settings)?;
+    // Nobody starts before everybody is ready: a node must not say that it runs before it does.
+    let start = Barrier::new(pairs.len() + 2);
+    let called_off = AtomicBool::new(false);
+    let (ready_sender, ready) = mpsc::channel();
+
+    thread::scope(|scope| {
+        let mut pair_threads = Vec::new();
+        for (index, (plan, place)) in pairs.into_iter().zip(&places).enumerate() {
+            let wishes = ThreadWishes { cpu: plan.cpu, priority: settings.priority };
+            let (ready, start, called_off) = (ready_sender.clone(), &start, &called_off);
+            let (bell, events) = (&bell, &events);
+            let name = &names[index];
+            pair_threads.push(scope.spawn(move || {
+                let PairPlan { camera, calibration, mount, settings, .. } = plan;
+                let mut detector = detector::lock_one(index);
+                let configured = detector.configure(&settings, &calibration, &mount);
+                if configured.is_ok() {
+                    pair::warm_up(&mut detector, raw_size(&calibration));
+                    // What it saw in the warm-up is forgotten.
+                    let _ = detector.configure(&settings, &calibration, &mount);
+                }
+                let _ = ready.send(configured.map(|()| wishes.ask()).map_err(|error| (index, error)));
+                start.wait();
+                if called_off.load(Ordering::Relaxed) {
+                    return PairReport::default();
+                }
+                PairLoop { name, camera, place, bell, events, stop }.run(&mut detector)
+            }));
+        }
+        let bus_thread = {
+            let wishes = ThreadWishes { cpu: settings.bus_cpu, priority: settings.priority };
+            let (ready, start, called_off) = (ready_sender, &start, &called_off);
+            scope.spawn(move || {
+                let _ = ready.send(Ok(wishes.ask()));
+                start.wait();
+                (!called_off.load(Ordering::Relaxed)).then(|| bus_loop.run())
+            })
+        };
+
+        let mut failure = None;
+        let mut refused: Vec<String> = Vec::new();
+        for message in ready {
+            match message {
+                Ok(wishes) => refused.extend(wishes),
+                Err((index, error)) => {
+                    let mut wrong = Failure::config(error, None);
+                    wrong.what = format!("pair {}: {}", names[index], wrong.what);
+                    failure.get_or_insert(wrong);
+                }
+            }
+        }
+        refused.sort();
+        refused.dedup();
+        refused.iter().for_each(|text| observe(Observation::Refused(text)));
+        called_off.store(failure.is_some(), Ordering::Relaxed);
+        start.wait();
+        if let Some(failure) = failure {
+            return Err(failure);
+        }
+        observe(Observation::Started);
+        let mut counts = Vec::new();
+        while !bus_thread.is_finished() {
+            thread::sleep(LOOK);
+            while let Some(event) = events.next() {
+                observe(Observation::Event(&event));
+            }
+            let before = std::mem::take(&mut counts);
+            counts.extend(places.iter().map(|place| place.alive.load(Ordering::Relaxed)));
+            counts.push(bus_alive.load(Ordering::Relaxed));
+            let ended = |index: usize| pair_threads.get(index).is_some_and(|thread| thread.is_finished());
+            let moved = |(index, (new, old)): (usize, (&u64, &u64))| new != old || ended(index);
+            let alive = before.len() == counts.len() && counts.iter().zip(&before).enumerate().all(moved);
+            let progress = progress.lock().map(|progress| *progress).unwrap_or_default();
+            observe(Observation::Look { progress, alive });
+        }
+        let bus = bus_thread.join().ok().flatten().unwrap_or_default();
+        let pairs = pair_threads.into_iter().filter_map(|thread| thread.join().ok()).collect();
+        while let Some(event) = events.next() {
+            observe(Observation::Event(&event));
+        }
+        Ok(RunReport { pairs, bus, events_dropped: events.dropped() })
+    })
+}
+
+const fn raw_size(calibration: &StereoCalibration) -> (u32, u32) {
+    match calibration {
+        StereoCalibration::Rectified(pair) => (pair.width, pair.height),
+        StereoCalibration::Raw(pair) => (pair.left.width, pair.left.height),
+    }
+}

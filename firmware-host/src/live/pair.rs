@@ -1,0 +1,187 @@
+//! The thread of a pair of cameras: picture by picture, from the camera to what was seen.
+
+use std::{
+    fmt,
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+
+use fencepost_core::{
+    detector::DetectError,
+    geometry::{Mount, StereoCalibration},
+    picture::Picture,
+    settings::Settings,
+};
+use fencepost_hal::{
+    camera::{Camera, CameraError, CameraErrorKind, StereoPair},
+    clock::monotonic_ns,
+};
+use serde::Serialize;
+
+use super::{
+    event::{Events, Severity},
+    exchange::{Bell, Place, Trouble},
+    latency::{Latency, LatencySummary},
+};
+use crate::detector::ProgramDetector;
+
+/// Shortest time between two calls of a camera that fails: one that fails at once must not take the whole processor.
+const LEAST_FAILING: Duration = Duration::from_millis(10);
+
+/// A pair of cameras and everything that is known of it.
+#[derive(Clone, Debug)]
+pub struct PairPlan<C> {
+    /// What it is called.
+    pub name: String,
+    /// Delivers the pictures.
+    pub camera: C,
+    /// Calibration of the two cameras.
+    pub calibration: StereoCalibration,
+    /// Where the left camera sits.
+    pub mount: Mount,
+    /// Settings of the detector.
+    pub settings: Settings,
+    /// Processor of the thread; any if `None`.
+    pub cpu: Option<u16>,
+}
+
+/// What became of a pair's pictures.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct PairReport {
+    /// What it is called.
+    pub name: String,
+    /// Pairs in which was looked for obstacles.
+    pub frames: u64,
+    /// Pictures that were lost or had no partner.
+    pub missed: u64,
+    /// Time-outs.
+    pub no_picture: u64,
+    /// Pairs that could not be used.
+    pub damaged: u64,
+    /// Calls that found the camera gone.
+    pub lost: u64,
+    /// From exposure to the call of the detector.
+    pub delivery: LatencySummary,
+    /// The detector alone.
+    pub detect: LatencySummary,
+}
+
+/// What a pair's thread works with.
+pub(super) struct PairLoop<'a, C> {
+    pub(super) name: &'a str,
+    pub(super) camera: C,
+    pub(super) place: &'a Place,
+    pub(super) bell: &'a Bell,
+    pub(super) events: &'a Events,
+    pub(super) stop: &'a AtomicBool,
+}
+
+impl<C: Camera> PairLoop<'_, C> {
+    /// Looks at pictures until it is told to stop or no further pictures come.
+    pub(super) fn run(mut self, detector: &mut ProgramDetector) -> PairReport {
+        let mut report = PairReport { name: self.name.to_string(), ..PairReport::default() };
+        let (mut delivery, mut detect) = (Latency::new(), Latency::new());
+        let mut trouble: Option<(Trouble, u64)> = None;
+        let (place, bell) = (self.place, self.bell);
+        while !self.stop.load(Ordering::Relaxed) {
+            let called = Instant::now();
+            let result = self.camera.next_pair(|pair| {
+                let start_ns = monotonic_ns();
+                delivery.record(start_ns.saturating_sub(pair.timestamp_ns));
+                look(pair, detector)?;
+                detect.record(monotonic_ns().saturating_sub(start_ns));
+                place.publish(pair.timestamp_ns, pair.missed, detector.detection());
+                Ok(pair.missed)
+            });
+            place.count_alive();
+            let found = match result {
+                Ok(None) => {
+                    place.fail(Trouble::Ended);
+                    bell.ring();
+                    break;
+                }
+                Ok(Some(Ok(missed))) => {
+                    report.frames += 1;
+                    report.missed += u64::from(missed);
+                    None
+                }
+                Ok(Some(Err(error))) => {
+                    report.damaged += 1;
+                    self.say(&mut trouble, Trouble::NotLookedAt, &NotLookedAt(error));
+                    Some(Trouble::NotLookedAt)
+                }
+                Err(error) => {
+                    let kind = error.kind();
+                    match kind {
+                        CameraErrorKind::NoPicture => report.no_picture += 1,
+                        CameraErrorKind::Damaged => report.damaged += 1,
+                        CameraErrorKind::Lost | CameraErrorKind::Unusable => report.lost += 1,
+                    }
+                    self.say(&mut trouble, Trouble::Camera(kind), &error);
+                    Some(Trouble::Camera(kind))
+                }
+            };
+            match found {
+                None => self.say_mended(&mut trouble),
+                Some(found) => place.fail(found),
+            }
+            bell.ring();
+            if found.is_some() {
+                thread::sleep(LEAST_FAILING.saturating_sub(called.elapsed()));
+            }
+        }
+        report.delivery = delivery.summary();
+        report.detect = detect.summary();
+        report
+    }
+
+    /// Says trouble when it begins or changes, not with every picture.
+    fn say(&self, known: &mut Option<(Trouble, u64)>, found: Trouble, what: &dyn fmt::Display) {
+        let now_ns = monotonic_ns();
+        if known.is_none_or(|(before, _)| before != found) {
+            self.events.tell(now_ns, Severity::Warning, format_args!("pair {}: {what}", self.name));
+        }
+        let since_ns = known.map_or(now_ns, |(_, since_ns)| since_ns);
+        *known = Some((found, since_ns));
+    }
+
+    fn say_mended(&self, known: &mut Option<(Trouble, u64)>) {
+        if let Some((_, since_ns)) = known.take() {
+            let now_ns = monotonic_ns();
+            let seconds = now_ns.saturating_sub(since_ns) as f64 * 1.0e-9;
+            let text = format_args!("pair {}: pictures again after {seconds:.1} s", self.name);
+            self.events.tell(now_ns, Severity::Note, text);
+        }
+    }
+}
+
+fn look(pair: &StereoPair<'_>, detector: &mut ProgramDetector) -> Result<(), DetectError> {
+    detector.detect(&pair.left, &pair.right, &mut ()).map(|_| ())
+}
+
+/// A pair that was not looked at, in words; takes no memory.
+struct NotLookedAt(DetectError);
+
+impl fmt::Display for NotLookedAt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            DetectError::NotConfigured => f.write_str("the detector is not configured"),
+            DetectError::WrongSize { found: (w, h), expected: (width, height) } => write!(
+                f,
+                "the pictures are {w} x {h}, the calibration is for {width} x {height}; set the camera to the size it was \
+                 calibrated with"
+            ),
+        }
+    }
+}
+
+/// Touches all memory that pictures of the configured size use, so that no frame has to wait for it, and forgets what it saw.
+pub(super) fn warm_up(detector: &mut ProgramDetector, size: (u32, u32)) {
+    let (width, height) = (size.0 as usize, size.1 as usize);
+    // Something to match and to make surfaces of.
+    let pixels: Vec<u8> = (0..width * height).map(|i| ((i * 2_654_435_761) >> 24) as u8).collect();
+    if let Ok(picture) = Picture::packed(&pixels, width, height) {
+        let _ = detector.detect(&picture, &picture, &mut ());
+    }
+}

@@ -1,0 +1,411 @@
+//! Cameras of Linux, by V4L2: two devices, or one that delivers both pictures in one.
+//!
+//! Pictures are taken from buffers that driver and program share: those that are grey already are lent as they lie there,
+//! the others are unpacked once. After the start nothing is allocated, except by the decoder of JPEG.
+//!
+//! A device that goes (unplugged, or its driver gave up) is an error of kind [`Lost`](CameraErrorKind::Lost); every further
+//! call tries to open it again, with the same settings.
+
+mod device;
+mod error;
+mod list;
+mod offers;
+mod setup;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+pub use error::{V4l2Error, V4l2Problem};
+pub use list::{ListedDevice, list};
+pub use offers::{OfferedControl, OfferedFormat, OfferedSize};
+
+use super::pairing::{Paired, Pairing, PairingCounts, Side};
+use super::pixels::{self, Unpacker};
+use super::{
+    Camera, CameraDevices, CameraError, CameraErrorKind, CameraSettings, CameraSettingsError, PackedLayout,
+    PixelFormat, StereoPair,
+};
+use crate::clock::monotonic_ns;
+use device::{Device, Frame, Taken};
+
+/// Time between two attempts to open a device that is gone, nanoseconds.
+const RETRY_NS: u64 = 100_000_000;
+
+/// A device that delivers nothing for so long is opened again: some come to life by that. Nanoseconds.
+const STALL_NS: u64 = 2_000_000_000;
+
+/// More warnings than this are not kept for somebody who does not ask.
+const MOST_WARNINGS: usize = 32;
+
+/// A pair of cameras that delivers pairs of pictures.
+pub struct V4l2Camera {
+    settings: CameraSettings,
+    left: Arc<Path>,
+    right: Arc<Path>,
+    layout: Option<PackedLayout>,
+    /// None while a device is gone.
+    open: Option<Open>,
+    opened_before: bool,
+    retry_ns: u64,
+    pairing: Pairing<Frame>,
+    said: PairingCounts,
+    warnings: Vec<String>,
+}
+
+/// The devices while they stream.
+struct Open {
+    left: Lens,
+    /// None where one device delivers both.
+    right: Option<Lens>,
+}
+
+struct Lens {
+    device: Device,
+    unpacker: Unpacker,
+}
+
+impl V4l2Camera {
+    /// Opens the devices, so that they stream.
+    ///
+    /// # Errors
+    /// When a setting cannot be used, or a device is not there, is used by another program, may not be opened, or cannot
+    /// deliver what the settings say.
+    pub fn open(settings: &CameraSettings) -> Result<Self, V4l2Error> {
+        let mut camera = Self::closed(settings)?;
+        camera.reopen()?;
+        Ok(camera)
+    }
+
+    /// As [`V4l2Camera::open`], but the devices are opened by the first call for a pair: for those that may be plugged in
+    /// later.
+    ///
+    /// # Errors
+    /// When a setting cannot be used.
+    pub fn closed(settings: &CameraSettings) -> Result<Self, V4l2Error> {
+        let unusable = |error: CameraSettingsError| {
+            let device = settings.left.as_deref().or(settings.device.as_deref()).unwrap_or(Path::new("camera"));
+            V4l2Error::new(&Arc::from(device), V4l2Problem::Setting(error))
+        };
+        settings.check().map_err(unusable)?;
+        let (left, right, layout) = match settings.devices().map_err(unusable)? {
+            CameraDevices::Two { left, right } => (Arc::from(left), Arc::from(right), None),
+            CameraDevices::One { device, layout } => (Arc::from(device), Arc::from(device), Some(layout)),
+        };
+        Ok(Self {
+            left,
+            right,
+            layout,
+            open: None,
+            opened_before: false,
+            retry_ns: 0,
+            pairing: Pairing::new(settings.pairing_tolerance_ns()),
+            said: PairingCounts::default(),
+            warnings: Vec::new(),
+            settings: settings.clone(),
+        })
+    }
+
+    /// Whether the devices are open.
+    pub const fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// The format of the left and of the right pictures, while the devices are open.
+    pub fn formats(&self) -> Option<(PixelFormat, PixelFormat)> {
+        let open = self.open.as_ref()?;
+        let format = |lens: &Lens| lens.device.pictures.format;
+        Some((format(&open.left), format(open.right.as_ref().unwrap_or(&open.left))))
+    }
+
+    /// What was odd about the pictures since the start.
+    pub const fn counts(&self) -> PairingCounts {
+        self.pairing.counts()
+    }
+
+    /// What was odd since the last call: settings that could not be set, times that jumped.
+    pub fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// The devices, opened again where they are gone. Waits until it is time to try.
+    fn reopen(&mut self) -> Result<&mut Open, V4l2Error> {
+        if self.open.is_none() {
+            let mut warnings = Vec::new();
+            let opened = Open::new(&self.settings, [&self.left, &self.right], self.layout, &mut warnings);
+            self.retry_ns = monotonic_ns().saturating_add(RETRY_NS);
+            let open = opened.map_err(|error| if self.opened_before { still_lost(error) } else { error })?;
+            // What cannot be set was said the first time.
+            if !std::mem::replace(&mut self.opened_before, true) {
+                self.warnings.append(&mut warnings);
+            }
+            self.open = Some(open);
+        }
+        self.open.as_mut().ok_or_else(|| V4l2Error::new(&self.left, V4l2Problem::NotBack))
+    }
+
+    /// Opens the devices if they are closed, no sooner than is sensible and no later than `deadline_ns`.
+    fn ready(&mut self, deadline_ns: u64) -> Result<(), V4l2Error> {
+        let now_ns = monotonic_ns();
+        if self.open.is_none() && now_ns < self.retry_ns {
+            let until_ns = self.retry_ns.min(deadline_ns);
+            std::thread::sleep(Duration::from_nanos(until_ns.saturating_sub(now_ns)));
+            if until_ns < self.retry_ns {
+                return Err(V4l2Error::new(&self.left, V4l2Problem::NotBack));
+            }
+        }
+        self.reopen().map(|_| ())
+    }
+
+    /// Closes the devices; the next call opens them again.
+    fn close(&mut self) {
+        self.pairing.restart(|_, _| ());
+        self.open = None;
+    }
+
+    /// Takes pictures until two of them are a pair.
+    ///
+    /// # Bound
+    /// Until `deadline_ns`, and no more pictures than the devices deliver until then.
+    fn wait_for_pair(&mut self, deadline_ns: u64) -> Result<Paired<Frame>, V4l2Error> {
+        let timeout_ms = self.settings.timeout_ms;
+        let mut came = [false; 2];
+        loop {
+            let Some(open) = &mut self.open else {
+                return Err(V4l2Error::new(&self.left, V4l2Problem::NotBack));
+            };
+            let side = self.pairing.wanted();
+            let pair = open.take(side, &mut self.pairing, self.settings.newest_only, &mut self.warnings)?;
+            if let Some(pair) = pair.pair {
+                return Ok(pair);
+            }
+            if pair.taken {
+                came[usize::from(side == Side::Right)] = true;
+            }
+            // A device that delivers pictures without partners must not hold the caller up.
+            if (pair.taken && monotonic_ns() < deadline_ns) || (!pair.taken && open.wait(side, deadline_ns)?) {
+                continue;
+            }
+            let problem = match came {
+                [true, true] => V4l2Problem::NoPartner { timeout_ms },
+                _ => V4l2Problem::NoPicture { timeout_ms },
+            };
+            let late = open.lens(side);
+            let error = V4l2Error::new(&late.device.path, problem);
+            if monotonic_ns().saturating_sub(late.device.alive_ns) > STALL_NS.max(20_000_000 * u64::from(timeout_ms)) {
+                self.close();
+                return Err(error);
+            }
+            // A picture that has waited so long would only be old.
+            let mut waited = [None, None];
+            self.pairing.release(|side, frame| waited[usize::from(side == Side::Right)] = Some((side, frame)));
+            open.put_back(waited)?;
+            return Err(error);
+        }
+    }
+
+    /// Says once what the pairing has found odd.
+    fn say(&mut self) {
+        let counts = self.pairing.counts();
+        let devices = format_args!("{} and {}", self.left.display(), self.right.display()).to_string();
+        let mut say = |first: bool, what: &str| {
+            if first && self.warnings.len() < MOST_WARNINGS {
+                self.warnings.push(format!("{devices}: {what}"));
+            }
+        };
+        say(
+            counts.jumps > 0 && self.said.jumps == 0,
+            "times of exposure have jumped back; pictures from before and after are never paired",
+        );
+        say(
+            counts.restarts > 0 && self.said.restarts == 0,
+            "the numbers of the pictures have begun anew; pictures lost meanwhile cannot be counted",
+        );
+        say(
+            counts.apart > 0 && self.said.apart == 0,
+            "their times of exposure are more than a second apart: their clocks do not agree, no pair can be made of them",
+        );
+        self.said = counts;
+    }
+}
+
+impl Camera for V4l2Camera {
+    type Error = V4l2Error;
+
+    fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, Self::Error> {
+        let deadline_ns = monotonic_ns().saturating_add(1_000_000 * u64::from(self.settings.timeout_ms));
+        self.ready(deadline_ns)?;
+        let result = self.wait_for_pair(deadline_ns).and_then(|pair| {
+            let not_back = || V4l2Error::new(&self.left, V4l2Problem::NotBack);
+            let open = self.open.as_mut().ok_or_else(not_back)?;
+            let result = open.lend(&pair, self.layout, consume);
+            if result.is_err() {
+                self.pairing.spoilt(&pair);
+            }
+            // A pair that was seen is a success; if a buffer is not taken back, the next call finds out why.
+            match open.put_back(pair_frames(&pair, self.layout)) {
+                Err(error) if result.is_err() => Err(error),
+                _ => result,
+            }
+        });
+        let counts = self.pairing.counts();
+        if (counts.jumps, counts.restarts, counts.apart) != (self.said.jumps, self.said.restarts, self.said.apart) {
+            self.say();
+        }
+        if result.as_ref().is_err_and(|error| error.kind() == CameraErrorKind::Lost) {
+            self.close();
+        }
+        result.map(Some)
+    }
+}
+
+/// What became of one attempt to take a picture.
+struct Attempt {
+    taken: bool,
+    pair: Option<Paired<Frame>>,
+}
+
+impl Open {
+    fn new(
+        settings: &CameraSettings,
+        [left, right]: [&Arc<Path>; 2],
+        layout: Option<PackedLayout>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, V4l2Error> {
+        let left = Lens::new(left, settings, warnings)?;
+        let right = match layout {
+            None => Some(Lens::new(right, settings, warnings)?),
+            Some(_) => None,
+        };
+        Ok(Self { left, right })
+    }
+
+    fn lens(&mut self, side: Side) -> &mut Lens {
+        match (side, &mut self.right) {
+            (Side::Right, Some(right)) => right,
+            _ => &mut self.left,
+        }
+    }
+
+    fn wait(&self, side: Side, deadline_ns: u64) -> Result<bool, V4l2Error> {
+        match (side, &self.right) {
+            (Side::Right, Some(right)) => right.device.wait(Some(&self.left.device), deadline_ns),
+            (_, right) => self.left.device.wait(right.as_ref().map(|right| &right.device), deadline_ns),
+        }
+    }
+
+    /// Takes the next picture of `side`, without waiting; with `newest` the newest that is there.
+    fn take(
+        &mut self,
+        side: Side,
+        pairing: &mut Pairing<Frame>,
+        newest: bool,
+        warnings: &mut Vec<String>,
+    ) -> Result<Attempt, V4l2Error> {
+        let both = self.right.is_none();
+        let lens = self.lens(side);
+        let mut found = None;
+        loop {
+            match lens.device.take(warnings)? {
+                Taken::Nothing => break,
+                Taken::Picture(stamp, frame) => {
+                    if let Some((older, frame)) = found.replace((stamp, frame)) {
+                        pairing.pass_over(side, older);
+                        if both {
+                            pairing.pass_over(Side::Right, older);
+                        }
+                        lens.device.put_back(frame)?;
+                    }
+                    if !newest {
+                        break;
+                    }
+                }
+                // A good one in front of it is older than need be, but good.
+                Taken::Damaged(stamp, _) if found.is_some() => {
+                    pairing.damaged(side, stamp);
+                    if both {
+                        pairing.damaged(Side::Right, stamp);
+                    }
+                }
+                Taken::Damaged(stamp, problem) => {
+                    pairing.damaged(side, stamp);
+                    if both {
+                        pairing.damaged(Side::Right, stamp);
+                    }
+                    return Err(V4l2Error::new(&lens.device.path, problem));
+                }
+            }
+        }
+        let Some((stamp, frame)) = found else { return Ok(Attempt { taken: false, pair: None }) };
+        let mut dropped = [None, None];
+        let mut drop = |side: Side, frame| dropped[usize::from(side == Side::Right)] = Some((side, frame));
+        let mut pair = pairing.push(side, stamp, frame, &mut drop);
+        if both {
+            pair = pairing.push(Side::Right, stamp, frame, &mut drop);
+        }
+        self.put_back(dropped)?;
+        Ok(Attempt { taken: true, pair })
+    }
+
+    fn put_back(&mut self, frames: [Option<(Side, Frame)>; 2]) -> Result<(), V4l2Error> {
+        // Both are tried, whatever becomes of the first.
+        let results = frames.map(|frame| frame.map_or(Ok(()), |(side, frame)| self.lens(side).device.put_back(frame)));
+        results.into_iter().collect()
+    }
+
+    /// Lends the pictures of a pair.
+    fn lend<R>(
+        &mut self,
+        pair: &Paired<Frame>,
+        layout: Option<PackedLayout>,
+        consume: impl FnOnce(&StereoPair<'_>) -> R,
+    ) -> Result<R, V4l2Error> {
+        let Paired { timestamp_ns, skew_ns, sequence, missed, .. } = *pair;
+        let path = &self.left.device.path;
+        let wrong = |path: &Arc<Path>, error| V4l2Error::new(path, V4l2Problem::Picture(error));
+        let left = self.left.unpacker.picture(self.left.device.bytes(pair.left));
+        let left = left.map_err(|error| wrong(path, error))?;
+        let (left, right) = match (&mut self.right, layout) {
+            (Some(lens), _) => {
+                let right = lens.unpacker.picture(lens.device.bytes(pair.right));
+                (left, right.map_err(|error| wrong(&lens.device.path, error))?)
+            }
+            (None, layout) => {
+                let layout = layout.unwrap_or(PackedLayout::SideBySide);
+                pixels::split(left, layout).map_err(|error| wrong(path, error))?
+            }
+        };
+        Ok(consume(&StereoPair { left, right, timestamp_ns, skew_ns, sequence, missed }))
+    }
+}
+
+impl Lens {
+    fn new(path: &Arc<Path>, settings: &CameraSettings, warnings: &mut Vec<String>) -> Result<Self, V4l2Error> {
+        let device = Device::open(path, settings, warnings)?;
+        let device::Pictures { format, width, height, stride, .. } = device.pictures;
+        let unpacker = Unpacker::new(format, width, height, stride);
+        let unpacker = unpacker.map_err(|error| V4l2Error::new(path, V4l2Problem::Picture(error)))?;
+        Ok(Self { device, unpacker })
+    }
+}
+
+impl std::fmt::Debug for V4l2Camera {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("V4l2Camera").field("settings", &self.settings).field("is_open", &self.is_open()).finish()
+    }
+}
+
+/// The buffers of a pair: one where both pictures lie in it.
+fn pair_frames(pair: &Paired<Frame>, layout: Option<PackedLayout>) -> [Option<(Side, Frame)>; 2] {
+    let right = layout.is_none().then_some((Side::Right, pair.right));
+    [Some((Side::Left, pair.left)), right]
+}
+
+/// A device that worked before and now cannot is not yet as it was: it is tried again.
+fn still_lost(error: V4l2Error) -> V4l2Error {
+    if error.kind() == CameraErrorKind::Lost {
+        return error;
+    }
+    let text = std::io::Error::other(error.to_string());
+    V4l2Error::setup(&error.device, "open", text)
+}

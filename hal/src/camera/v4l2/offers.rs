@@ -1,0 +1,226 @@
+//! What a device offers: formats, sizes, rates, controls.
+
+use std::fs::File;
+
+use serde::Serialize;
+use v4l2r::bindings::{v4l2_frmivalenum, v4l2_frmsizeenum, v4l2_queryctrl};
+use v4l2r::ioctl::{
+    self, Capabilities, Capability, CtrlId, FormatIterator, FrmIvalTypes, FrmSizeTypes, QueryCtrlFlags,
+};
+use v4l2r::nix::errno::Errno;
+use v4l2r::{PixelFormat as FourCc, QueueType};
+
+use crate::camera::PixelFormat;
+
+/// More of anything than this is not a list that ends.
+const MOST: u32 = 256;
+
+/// A format that a device offers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfferedFormat {
+    /// Its four characters, without blanks at the end.
+    pub fourcc: String,
+    /// The driver's name for it.
+    pub description: String,
+    /// The format, where it is one that pictures are taken from.
+    pub format: Option<PixelFormat>,
+    /// Sizes of pictures.
+    pub sizes: Vec<OfferedSize>,
+}
+
+/// A size of pictures, or a range of them where largest and smallest differ.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfferedSize {
+    /// Smallest width and height, px.
+    pub min: (u32, u32),
+    /// Largest width and height, px.
+    pub max: (u32, u32),
+    /// Step of width and height, px.
+    pub step: (u32, u32),
+    /// Pictures per second at this size (at the largest one of a range), slowest and fastest of a range.
+    pub rates_hz: Vec<f32>,
+}
+
+/// A control that a device has.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct OfferedControl {
+    /// The driver's name for it.
+    pub name: String,
+    /// Identifier.
+    pub id: u32,
+    /// Smallest value.
+    pub min: i32,
+    /// Largest value.
+    pub max: i32,
+    /// Value at the start.
+    pub default: i32,
+    /// Value now, where it can be read.
+    pub value: Option<i32>,
+}
+
+/// Controls of exposure and gain, as the kernel numbers them (`v4l2-controls.h`).
+pub(super) mod id {
+    pub(in crate::camera::v4l2) const AUTOGAIN: u32 = 0x0098_0912;
+    pub(in crate::camera::v4l2) const GAIN: u32 = 0x0098_0913;
+    pub(in crate::camera::v4l2) const EXPOSURE: u32 = 0x0098_0911;
+    pub(in crate::camera::v4l2) const EXPOSURE_AUTO: u32 = 0x009A_0901;
+    pub(in crate::camera::v4l2) const EXPOSURE_ABSOLUTE: u32 = 0x009A_0902;
+    pub(in crate::camera::v4l2) const ANALOGUE_GAIN: u32 = 0x009E_0903;
+}
+
+/// The interface by which a device delivers pictures, or its name where it does not.
+pub(super) fn queue(file: &File) -> Result<QueueType, String> {
+    let capability: Capability = ioctl::querycap(file).map_err(|_| "it is no V4L2 device".to_owned())?;
+    let offered = capability.device_caps();
+    if !offered.contains(Capabilities::STREAMING) {
+        return Err(capability.card);
+    }
+    if offered.contains(Capabilities::VIDEO_CAPTURE) {
+        Ok(QueueType::VideoCapture)
+    } else if offered.contains(Capabilities::VIDEO_CAPTURE_MPLANE) {
+        Ok(QueueType::VideoCaptureMplane)
+    } else {
+        Err(capability.card)
+    }
+}
+
+/// Every format with its sizes.
+pub(super) fn formats(file: &File, queue: QueueType) -> Vec<OfferedFormat> {
+    let descriptions = FormatIterator::new(file, queue).take(MOST as usize);
+    let format = |description: ioctl::FmtDesc| {
+        let fourcc: [u8; 4] = description.pixelformat.into();
+        OfferedFormat {
+            fourcc: String::from_utf8_lossy(&fourcc).trim_end().to_owned(),
+            description: description.description,
+            format: PixelFormat::from_fourcc(fourcc),
+            sizes: sizes(file, description.pixelformat),
+        }
+    };
+    descriptions.map(format).collect()
+}
+
+/// The formats in one line.
+pub(super) fn in_words(formats: &[OfferedFormat]) -> String {
+    if formats.is_empty() {
+        return "nothing".to_owned();
+    }
+    let sizes = |format: &OfferedFormat| {
+        let sizes: Vec<String> = format.sizes.iter().map(ToString::to_string).collect();
+        format!("{} {}", format.fourcc, sizes.join(", "))
+    };
+    formats.iter().map(sizes).collect::<Vec<_>>().join("; ")
+}
+
+/// Every rate of pictures of one size.
+pub(super) fn rates_hz(file: &File, format: FourCc, (width, height): (u32, u32)) -> Vec<f32> {
+    let mut rates = Vec::new();
+    let hz = |fraction: &v4l2r::bindings::v4l2_fract| fraction.denominator as f32 / fraction.numerator.max(1) as f32;
+    for index in 0..MOST {
+        let interval: Result<v4l2_frmivalenum, _> = ioctl::enum_frame_intervals(file, index, format, width, height);
+        match interval.as_ref().ok().and_then(|interval| interval.intervals()) {
+            Some(FrmIvalTypes::Discrete(interval)) => rates.push(hz(interval)),
+            Some(FrmIvalTypes::StepWise(range)) => {
+                rates.extend([hz(&range.max), hz(&range.min)]);
+                break;
+            }
+            None => break,
+        }
+    }
+    rates
+}
+
+/// The controls of exposure and gain that the device has.
+pub(super) fn controls(file: &File) -> Vec<OfferedControl> {
+    use id::{ANALOGUE_GAIN, AUTOGAIN, EXPOSURE, EXPOSURE_ABSOLUTE, EXPOSURE_AUTO, GAIN};
+    let known = [EXPOSURE_AUTO, EXPOSURE_ABSOLUTE, EXPOSURE, AUTOGAIN, GAIN, ANALOGUE_GAIN];
+    known.into_iter().filter_map(|id| control(file, id)).collect()
+}
+
+/// A control, if the device has it.
+pub(super) fn control(file: &File, id: u32) -> Option<OfferedControl> {
+    /// The device shows it, but has it not.
+    const DISABLED: u32 = 1;
+    let query: v4l2_queryctrl = ioctl::queryctrl(file, CtrlId::new(id).ok()?, QueryCtrlFlags::empty()).ok()?;
+    if query.flags & DISABLED != 0 {
+        return None;
+    }
+    let name = query.name.split(|byte| *byte == 0).next().unwrap_or_default();
+    Some(OfferedControl {
+        name: String::from_utf8_lossy(name).into_owned(),
+        id,
+        min: query.minimum,
+        max: query.maximum,
+        default: query.default_value,
+        value: ioctl::g_ctrl(file, id).ok(),
+    })
+}
+
+fn sizes(file: &File, format: FourCc) -> Vec<OfferedSize> {
+    let mut sizes = Vec::new();
+    for index in 0..MOST {
+        let size: Result<v4l2_frmsizeenum, Errno> = ioctl::enum_frame_sizes(file, index, format).map_err(Errno::from);
+        match size.as_ref().ok().and_then(|size| size.size()) {
+            Some(FrmSizeTypes::Discrete(size)) => {
+                let size = (size.width, size.height);
+                sizes.push(OfferedSize { min: size, max: size, step: (1, 1), rates_hz: rates_hz(file, format, size) });
+            }
+            Some(FrmSizeTypes::StepWise(range)) => {
+                let max = (range.max_width, range.max_height);
+                sizes.push(OfferedSize {
+                    min: (range.min_width, range.min_height),
+                    max,
+                    step: (range.step_width.max(1), range.step_height.max(1)),
+                    rates_hz: rates_hz(file, format, max),
+                });
+                break;
+            }
+            None => break,
+        }
+    }
+    sizes
+}
+
+impl OfferedSize {
+    /// Whether pictures of this size are within it.
+    pub const fn holds(&self, width: u32, height: u32) -> bool {
+        let (min, max, step) = (self.min, self.max, self.step);
+        width >= min.0
+            && width <= max.0
+            && height >= min.1
+            && height <= max.1
+            && (width - min.0).is_multiple_of(step.0)
+            && (height - min.1).is_multiple_of(step.1)
+    }
+}
+
+impl core::fmt::Display for OfferedSize {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} x {}", self.min.0, self.min.1)?;
+        if self.min != self.max {
+            write!(f, " to {} x {}", self.max.0, self.max.1)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_in_words_and_what_they_hold() {
+        let fixed = OfferedSize { min: (640, 480), max: (640, 480), step: (1, 1), rates_hz: vec![30.0] };
+        let range = OfferedSize { min: (2, 1), max: (1920, 1080), step: (2, 1), rates_hz: vec![] };
+        assert!(fixed.holds(640, 480) && !fixed.holds(320, 240));
+        assert!(range.holds(512, 384) && !range.holds(513, 384) && !range.holds(1922, 10));
+        let format = |fourcc: &str, sizes| OfferedFormat {
+            fourcc: fourcc.to_owned(),
+            description: String::new(),
+            format: None,
+            sizes,
+        };
+        let words = in_words(&[format("GREY", vec![fixed.clone(), fixed]), format("YUYV", vec![range])]);
+        assert_eq!(words, "GREY 640 x 480, 640 x 480; YUYV 2 x 1 to 1920 x 1080");
+        assert_eq!(in_words(&[]), "nothing");
+    }
+}
