@@ -56,9 +56,11 @@ fn plan(config: &Config, wire: WireConfig, console: &mut Console) -> Result<Plan
     for pair in &config.rig.pairs {
         console.note(format_args!("pair {}: {}", pair.name, pair.source.describe()));
         pair.warnings.iter().for_each(|warning| console.warn(format_args!("pair {}: {warning}", pair.name)));
+        let mut camera = RigCamera::open(pair)?;
+        camera.take_warnings().iter().for_each(|warning| console.warn(format_args!("pair {}: {warning}", pair.name)));
         pairs.push(PairPlan {
             name: pair.name.clone(),
-            camera: RigCamera::open(pair)?,
+            camera,
             calibration: pair.calibration,
             mount: pair.mount,
             settings: config.settings_for(pair.picture_size().0),

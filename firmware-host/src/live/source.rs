@@ -68,7 +68,12 @@ impl RigCamera {
 fn open_camera(settings: &fencepost_hal::camera::CameraSettings) -> Result<RigCamera, Failure> {
     use fencepost_hal::camera::v4l2::V4l2Camera;
 
-    let camera = V4l2Camera::open(settings).map_err(|error| Failure::work(error.to_string()))?;
+    // A camera that is not there may come: the loop waits for it and says so.
+    let camera = match V4l2Camera::open(settings) {
+        Err(error) if error.kind() == CameraErrorKind::Lost => V4l2Camera::closed(settings),
+        opened => opened,
+    };
+    let camera = camera.map_err(|error| Failure::work(error.to_string()))?;
     Ok(RigCamera::V4l2(Box::new(camera)))
 }
 
@@ -83,6 +88,17 @@ pub(super) fn no_v4l() -> Failure {
     Failure::usage("this program was built without V4L2 cameras").mend(
         "on Debian: apt install libclang-dev linux-libc-dev, then cargo build --release --features v4l (docs/deploy.md)",
     )
+}
+
+impl RigCamera {
+    /// What was odd when the cameras were opened.
+    pub fn take_warnings(&mut self) -> Vec<String> {
+        match self {
+            #[cfg(feature = "v4l")]
+            Self::V4l2(camera) => camera.take_warnings(),
+            Self::Recording(_) | Self::Scene(_) => Vec::new(),
+        }
+    }
 }
 
 impl Camera for RigCamera {
