@@ -52,6 +52,8 @@ pub enum Command {
     Demo(DemoArgs),
     /// Detect obstacles in a recording.
     Replay(ReplayArgs),
+    /// Run a rig: from its cameras to the CAN bus, until SIGTERM or SIGINT.
+    Run(RunArgs),
     /// Say what a recording, a calibration or a configuration holds, and what the detector can see with it.
     Check(CheckArgs),
     /// Work with CAN logs.
@@ -99,6 +101,29 @@ pub struct ReplayArgs {
     /// Settings of the detector and of the bus.
     #[command(flatten)]
     pub detector: DetectorArgs,
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// The rig in TOML: cameras, mounts, bus. `docs/files.md` lists all settings, `fencepost check FILE` tries them.
+    #[arg(long, value_name = "FILE")]
+    pub config: PathBuf,
+    /// Node id on the bus, in place of the one in the file.
+    #[arg(long, value_name = "N")]
+    pub node: Option<u8>,
+    /// Stop after so many seconds.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// At the end, write counts and times to this file as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    // Also refuses what is not a number.
+    if (0.0..=1.0e9).contains(&seconds) { Ok(seconds) } else { Err("give a number of seconds".to_string()) }
 }
 
 /// Settings of the detector and of the bus, for every command that detects.

@@ -71,6 +71,11 @@ impl Console {
         self.say(format_args!("error: {error}"));
     }
 
+    /// Says something that happened while the program runs on; not counted, and not left out when it repeats.
+    pub fn event(&self, text: impl fmt::Display) {
+        self.say(format_args!("{text}"));
+    }
+
     /// Says something that only matters to who asked for it with `-v`.
     pub fn note(&self, text: impl fmt::Display) {
         if self.verbose {

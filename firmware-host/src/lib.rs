@@ -56,6 +56,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match cli.command.unwrap_or_else(|| Command::Demo(DemoArgs::default())) {
         Command::Demo(args) => commands::demo(&args, &mut console),
         Command::Replay(args) => commands::replay(&args, &mut console),
+        Command::Run(args) => commands::run(&args, &mut console),
         Command::Check(args) => commands::check(&args, &mut console),
         Command::Can(CanCommand::Decode(args)) => commands::decode(&args, &console),
     };

@@ -5,11 +5,13 @@ mod check;
 mod demo;
 mod optics;
 mod replay;
+mod run;
 
 pub use can::decode;
 pub use check::check;
 pub use demo::demo;
 pub use replay::replay;
+pub use run::run;
 
 use std::{path::Path, time::Instant};
 

@@ -11,6 +11,7 @@ use std::{
 use embedded_can::Id;
 use fencepost_core::{
     health::{Health, HealthLevel, HealthReason},
+    map::Merged,
     wire::{
         CellsRepr, Command, CommandReceiver, CommandStatistics, FIXED_FRAMES_PER_SCAN, Frame, HEARTBEAT_RATE_HZ,
         NodeState, Scan, ScanEncoder, Status, WireConfig,
@@ -26,12 +27,11 @@ use serde::Serialize;
 use super::{
     event::{Events, Severity},
     exchange::{Bell, Place, Trouble},
-    gather::{Gathered, PairView},
     latency::{Latency, LatencySummary},
     settings::{MAX_PAIRS, RunSettings},
     watch::{EchoWatch, Watch, joined},
 };
-use crate::error::Failure;
+use crate::{detector::CELLS, error::Failure};
 
 /// Most runs of cells in a scan: 255 frames of 8.
 const RUNS: usize = 255 * CellsRepr::FD_RUNS;
@@ -110,6 +110,14 @@ pub struct Progress {
     pub speed_m_s: Option<f32>,
 }
 
+/// What the bus thread is to do.
+#[derive(Clone, Copy)]
+pub(super) struct BusPlan<'a> {
+    pub(super) wire: WireConfig,
+    pub(super) settings: &'a RunSettings,
+    pub(super) sector_width_deg: f32,
+}
+
 /// What the bus thread shares with the others.
 pub(super) struct BusShared<'a> {
     pub(super) places: &'a [Place],
@@ -132,7 +140,8 @@ pub(super) struct BusLoop<'a, B: CanBus> {
     motion_heard: bool,
     echo: EchoWatch,
     watch: Watch,
-    gathered: Gathered,
+    merged: Box<Merged<CELLS>>,
+    sector_width_deg: f32,
     pairs: [PairState; MAX_PAIRS],
     condition: BusCondition,
     bus_trouble: Option<BusErrorKind>,
@@ -171,12 +180,8 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
     ///
     /// # Errors
     /// When the settings ask for more cells than there is room for.
-    pub(super) fn new(
-        shared: BusShared<'a>,
-        bus: B,
-        wire: WireConfig,
-        settings: &RunSettings,
-    ) -> Result<Self, Failure> {
+    pub(super) fn new(shared: BusShared<'a>, bus: B, plan: BusPlan<'_>) -> Result<Self, Failure> {
+        let BusPlan { wire, settings, .. } = plan;
         let encoder = ScanEncoder::new(wire).map_err(|error| Failure::config(error, None))?;
         let ns = |ms: u32| u64::from(ms) * 1_000_000;
         let now_ns = monotonic_ns();
@@ -190,7 +195,8 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             motion_heard: settings.controller_required,
             echo: EchoWatch::new(ns(settings.echo_timeout_ms), settings.controller_required),
             watch: Watch::new(ns(settings.hold_ms)),
-            gathered: Gathered::new(),
+            merged: Box::new(Merged::new()),
+            sector_width_deg: plan.sector_width_deg,
             pairs: [PairState::default(); MAX_PAIRS],
             condition: BusCondition::default(),
             bus_trouble: None,
@@ -295,21 +301,26 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
     fn scan(&mut self, now_ns: u64) {
         self.first_fresh_ns = None;
         let stale_ns = u64::from(self.settings.stale_ms) * 1_000_000;
-        self.gathered.clear();
-        let mut oldest_ns = None;
+        self.merged.clear();
+        let mut oldest_ns: Option<u64> = None;
         for (pair, place) in self.pairs.iter_mut().zip(self.shared.places) {
             pair.fresh = false;
             let newest = place.lock();
-            let usable = newest.published > 0 && now_ns.saturating_sub(newest.exposure_ns) <= stale_ns;
+            let mut health = Health::default();
             // What a pair saw before it got into trouble is not mixed with what the others see now.
-            let view = match newest.trouble {
-                None | Some(Trouble::Ended) if usable => PairView::Seen(&newest.detection),
-                _ => PairView::Blind,
-            };
-            if matches!(view, PairView::Seen(_)) {
-                oldest_ns = Some(oldest_ns.map_or(newest.exposure_ns, |oldest: u64| oldest.min(newest.exposure_ns)));
+            match newest.trouble.filter(|trouble| *trouble != Trouble::Ended) {
+                Some(trouble) => health.raise(HealthReason::MissingPicture, trouble.level()),
+                None if newest.published == 0 || now_ns.saturating_sub(newest.exposure_ns) > stale_ns => {
+                    health.raise(HealthReason::StalePicture, HealthLevel::Blind);
+                }
+                // The pairs of a rig have the same settings, and so the same cells.
+                None if self.merged.add(&newest.detection).is_ok() => {
+                    oldest_ns = Some(oldest_ns.map_or(newest.exposure_ns, |oldest| oldest.min(newest.exposure_ns)));
+                    continue;
+                }
+                None => {}
             }
-            self.gathered.add(&view);
+            self.merged.add_health(health);
         }
         let Some(exposure_ns) = oldest_ns else { return };
 
@@ -317,18 +328,19 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         if age_ns > self.deadline_ns() {
             self.watch.see(HealthReason::Late, HealthLevel::Degraded, now_ns);
         }
-        let seen = self.gathered.detection();
+        let (seen, map, sectors) =
+            (self.merged.health(), self.merged.map(), self.merged.sectors(self.sector_width_deg));
         // Counts the scans and not the frames: a gap would tell a receiver that it has missed something.
         let scan_index = self.report.scans as u16;
-        self.scan_health = seen.health;
+        self.scan_health = seen;
         let scan = Scan {
             scan_index,
             age_ns,
-            health: joined(seen.health, self.watch.health(now_ns)),
-            geometry: &seen.map.geometry,
-            cells: &seen.map.cells,
-            sectors: &seen.sectors,
-            ground: seen.ground.as_ref(),
+            health: joined(seen, self.watch.health(now_ns)),
+            geometry: &map.geometry,
+            cells: &map.cells,
+            sectors: &sectors,
+            ground: self.merged.ground(),
         };
         self.frames.clear();
         // There is room for the frames of any scan.

@@ -16,12 +16,12 @@
 mod bus;
 mod event;
 mod exchange;
-mod gather;
 mod latency;
 mod pair;
 mod realtime;
 mod service;
 mod settings;
+mod source;
 mod watch;
 
 pub use bus::{BusReport, CommandReport, Progress, SentReport};
@@ -31,6 +31,7 @@ pub use pair::{PairPlan, PairReport};
 pub(crate) use realtime::check_cpu;
 pub use service::{Systemd, stop_at_signals};
 pub use settings::{BusSettings, MAX_PAIRS, RunSettings};
+pub use source::{RigCamera, RigCameraError};
 
 use std::{
     sync::{
@@ -47,7 +48,7 @@ use fencepost_hal::{camera::Camera, can::CanBus};
 use serde::Serialize;
 
 use crate::{detector, error::Failure};
-use bus::{BusLoop, BusShared};
+use bus::{BusLoop, BusPlan, BusShared};
 use event::Events;
 use exchange::{Bell, Place};
 use pair::PairLoop;
@@ -65,6 +66,8 @@ pub struct Plan<C> {
     pub wire: WireConfig,
     /// Deadlines and time-outs.
     pub settings: RunSettings,
+    /// Width of the sectors of the merged map, degrees.
+    pub sector_width_deg: f32,
 }
 
 /// What the main thread sees of the loop.
@@ -110,7 +113,7 @@ where
     C: Camera + Send,
     B: CanBus<Error: Send> + Send,
 {
-    let Plan { pairs, wire, settings } = plan;
+    let Plan { pairs, wire, settings, sector_width_deg } = plan;
     if pairs.is_empty() || pairs.len() > MAX_PAIRS {
         return Err(Failure::usage(format!("a rig has 1 to {MAX_PAIRS} pairs of cameras, not {}", pairs.len())));
     }
@@ -124,9 +127,10 @@ where
     let (bell, events, progress, bus_alive) = (Bell::default(), Events::default(), Mutex::default(), AtomicU64::new(0));
     let shared =
         BusShared { places: &places, bell: &bell, events: &events, stop, progress: &progress, alive: &bus_alive };
-    let bus_loop = BusLoop::new(shared, bus, wire, &settings)?;
+    let bus_loop = BusLoop::new(shared, bus, BusPlan { wire, settings: &settings, sector_width_deg })?;
     // Nobody starts before everybody is ready: a node must not say that it runs before it does.
-    let start = Barrier::new(pairs.len() + 2);
+    let threads = pairs.len() + 1;
+    let start = Barrier::new(threads + 1);
     let called_off = AtomicBool::new(false);
     let (ready_sender, ready) = mpsc::channel();
 
@@ -166,7 +170,8 @@ where
 
         let mut failure = None;
         let mut refused: Vec<String> = Vec::new();
-        for message in ready {
+        // The senders live as long as the threads: one message from each is all there will be.
+        for message in ready.iter().take(threads) {
             match message {
                 Ok(wishes) => refused.extend(wishes),
                 Err((index, error)) => {
