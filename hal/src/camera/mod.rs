@@ -1,5 +1,6 @@
 //! Stereo cameras: whatever delivers pairs of pictures.
 
+mod fault;
 mod format;
 mod memory;
 mod paced;
@@ -9,6 +10,7 @@ mod settings;
 #[cfg(all(feature = "v4l", target_os = "linux"))]
 pub mod v4l2;
 
+pub use fault::{FaultyCamera, FaultyCounts, FaultyError, Sides};
 pub use format::PixelFormat;
 pub use memory::MemoryCamera;
 pub use paced::PacedCamera;

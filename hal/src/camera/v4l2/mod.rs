@@ -409,3 +409,53 @@ fn still_lost(error: V4l2Error) -> V4l2Error {
     let text = std::io::Error::other(error.to_string());
     V4l2Error::setup(&error.device, "open", text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_that_cannot_be_used_are_told_before_anything_is_opened() {
+        let same = CameraSettings::two("/dev/video0", "/dev/video0", 640, 480);
+        let error = V4l2Camera::open(&same).unwrap_err();
+        assert_eq!(error.kind(), CameraErrorKind::Unusable);
+        assert!(error.to_string().starts_with("camera.right: is the same device"), "{error}");
+    }
+
+    #[test]
+    fn a_device_that_is_not_there_is_tried_again_and_never_waited_for_longer_than_the_time_out() {
+        let settings =
+            CameraSettings { timeout_ms: 20, ..CameraSettings::two("/nowhere/left", "/nowhere/right", 640, 480) };
+        assert_eq!(V4l2Camera::open(&settings).unwrap_err().kind(), CameraErrorKind::Lost);
+        let mut camera = V4l2Camera::closed(&settings).unwrap();
+        let mut tried = 0;
+        for call in 0..12 {
+            let error = camera.next_pair(|_| ()).unwrap_err();
+            assert_eq!(error.kind(), CameraErrorKind::Lost);
+            match error.problem {
+                V4l2Problem::Absent => tried += 1,
+                V4l2Problem::NotBack => assert!(call > 0),
+                problem => panic!("{problem:?}"),
+            }
+        }
+        // Five calls of 20 ms fill the time between two attempts.
+        assert!((1..=4).contains(&tried), "tried {tried} times in twelve calls");
+        assert!(!camera.is_open() && camera.formats().is_none());
+    }
+
+    #[test]
+    fn a_file_that_is_no_camera_is_said_to_be_none() {
+        let error = V4l2Camera::open(&CameraSettings::two("/dev/null", "/dev/zero", 640, 480)).unwrap_err();
+        assert_eq!(error.kind(), CameraErrorKind::Unusable);
+        assert!(error.to_string().contains("takes no pictures"), "{error}");
+    }
+
+    #[test]
+    fn what_worked_before_is_tried_again_whatever_the_error() {
+        let device: Arc<Path> = Path::new("/dev/video0").into();
+        let unusable = V4l2Error::new(&device, V4l2Problem::NoCamera { card: "codec".into() });
+        let lost = still_lost(unusable);
+        assert_eq!(lost.kind(), CameraErrorKind::Lost);
+        assert!(lost.to_string().contains("codec"), "{lost}");
+    }
+}
