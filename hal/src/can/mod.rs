@@ -6,6 +6,7 @@
 //!      └──────────────────────────────────────────────────── takes heartbeats and scans, and never waits
 //! ```
 
+mod bus_fault;
 mod candump;
 mod fault;
 mod frame;
@@ -14,6 +15,7 @@ mod socket;
 mod transmit;
 mod virtual_bus;
 
+pub use bus_fault::{BusFaultControl, BusFaultCounts, BusFaultError, BusFaultInjector};
 pub use candump::{CandumpError, CandumpLine, CandumpProblem, CandumpWriter, LoggedBusError, parse_candump};
 pub use fault::{FaultCounts, FaultInjector};
 pub use frame::{CanFrame, FrameParseError};

@@ -84,7 +84,7 @@ impl SocketCanError {
         let is_virtual = interface.starts_with("vcan") || interface.starts_with("vxcan");
         match self.problem {
             SocketCanProblem::NotThere if is_virtual => {
-                format!("make it: `sudo ip link add {interface} type vcan mtu 72 && sudo ip link set {interface} up`")
+                format!("make it: `sudo ip link add {interface} type vcan && sudo ip link set {interface} up`")
             }
             SocketCanProblem::NotThere => {
                 "plug the adapter in, or load its driver; `ip -brief link show type can` lists what is there".to_owned()

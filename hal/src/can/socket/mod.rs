@@ -176,22 +176,29 @@ impl SocketCan {
         }
     }
 
+    /// Takes note of an error frame.
+    fn take_note(&mut self, class: u32, data: &[u8]) {
+        let before = self.condition.controller;
+        error_frame::take_note(&mut self.condition, class, data);
+        if self.condition.controller == ControllerState::BusOff && before != ControllerState::BusOff {
+            self.bus_off_look_ns = monotonic_ns().saturating_add(BUS_OFF_LOOK_NS);
+        }
+    }
+
     /// A controller is believed to be off the bus until it says otherwise; that word may be lost, so that its carrier is asked
     /// now and then.
     fn look_at_carrier(&mut self) {
         if self.condition.controller != ControllerState::BusOff {
-            self.bus_off_look_ns = 0;
             return;
         }
         let now_ns = monotonic_ns();
-        if self.bus_off_look_ns == 0 {
-            self.bus_off_look_ns = now_ns.saturating_add(BUS_OFF_LOOK_NS);
-        } else if now_ns >= self.bus_off_look_ns {
-            self.bus_off_look_ns = now_ns.saturating_add(BUS_OFF_LOOK_NS);
-            if self.carrier_file.as_deref().is_some_and(has_carrier) {
-                self.condition.controller = ControllerState::ErrorActive;
-                self.condition.restarts = self.condition.restarts.saturating_add(1);
-            }
+        if now_ns < self.bus_off_look_ns {
+            return;
+        }
+        self.bus_off_look_ns = now_ns.saturating_add(BUS_OFF_LOOK_NS);
+        if self.carrier_file.as_deref().is_some_and(has_carrier) {
+            self.condition.controller = ControllerState::ErrorActive;
+            self.condition.restarts = self.condition.restarts.saturating_add(1);
         }
     }
 
@@ -235,7 +242,7 @@ impl CanBus for SocketCan {
                 Err(error) => return Err(self.failed(&error, false)),
             };
             if let CanAnyFrame::Error(frame) = &frame {
-                error_frame::take_note(&mut self.condition, frame.error_bits(), frame.data());
+                self.take_note(frame.error_bits(), frame.data());
             } else if let Some(frame) = received(&frame) {
                 return Ok(Some((self.arrived_ns(stamps.socket), frame)));
             }
