@@ -3,12 +3,14 @@
 mod can;
 mod check;
 mod demo;
+mod listen;
 mod optics;
 mod replay;
 
 pub use can::decode;
 pub use check::check;
 pub use demo::demo;
+pub use listen::listen;
 pub use replay::replay;
 
 use std::{path::Path, time::Instant};
