@@ -13,6 +13,8 @@ use crate::scans::{Outcome, ScanAssembly, WholeScan};
 
 /// What the controller says counts for that long.
 pub const COMMAND_TIMEOUT_NS: u64 = 500_000_000;
+/// What a node says of itself counts for that long.
+pub const HEARTBEAT_TIMEOUT_NS: u64 = 300_000_000;
 /// Scans are counted over that time for their rate.
 const RATE_WINDOW_NS: u64 = 3_000_000_000;
 /// The smallest map that is shown: 10 m ahead, 5 m to either side in cells of 0.5 m.

@@ -1,6 +1,9 @@
 //! What was heard means, in words: the first thing that a person wants to know.
 
-use fencepost_core::{health::HealthLevel, wire::NoScan};
+use fencepost_core::{
+    health::HealthLevel,
+    wire::{NoScan, NodeState},
+};
 use fencepost_hal::can::{BusCondition, ControllerState};
 
 use super::{Listener, node::Node, source::SourceState};
@@ -77,6 +80,9 @@ pub fn of_node(node: &Node, now_ns: u64) -> Verdict {
     match node.objection(now_ns) {
         None => usable(node, now_ns),
         Some(NoScan::NoHeartbeat) => match node.heartbeat() {
+            Some((heartbeat, at_ns)) if heartbeat.state == NodeState::Stopping => {
+                Verdict::new(Severity::Bad, format!("STOPPED in an orderly way {:.1} s ago", since(*at_ns)))
+            }
             Some((_, at_ns)) => Verdict::new(
                 Severity::Bad,
                 format!("NO HEARTBEAT for {:.1} s: do not drive by this map", since(*at_ns)),
@@ -151,7 +157,7 @@ fn usable(node: &Node, now_ns: u64) -> Verdict {
 mod tests {
     use super::super::testing::{Speaker, node};
     use super::*;
-    use fencepost_core::wire::{BaseId, NodeState};
+    use fencepost_core::wire::BaseId;
 
     fn said(speaker: &mut Speaker, now_ns: u64) -> Verdict {
         let mut listener = Listener::new(BaseId::DEFAULT, None);
@@ -172,6 +178,7 @@ mod tests {
         let mut stopping = Speaker::new(0);
         stopping.status.state = NodeState::Stopping;
         assert_eq!(said(&mut stopping, 0).text, "NOT RUNNING: the node is stopping");
+        assert_eq!(said(&mut stopping, 2_000_000_000).text, "STOPPED in an orderly way 2.0 s ago");
         let mut blind = Speaker::new(0);
         blind.status.health.level = HealthLevel::Blind;
         assert!(said(&mut blind, 0).text.starts_with("BLIND"));

@@ -1,6 +1,6 @@
 //! What is known of a node, in words and numbers.
 
-use fencepost_core::health::{Health, HealthLevel};
+use fencepost_core::health::HealthLevel;
 use fencepost_hal::can::ControllerState;
 use ratatui::text::{Line, Span};
 
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     listen::{
-        node::{COMMAND_TIMEOUT_NS, Node},
+        node::{COMMAND_TIMEOUT_NS, HEARTBEAT_TIMEOUT_NS, Node},
         verdict::{self, Severity},
     },
     words,
@@ -22,15 +22,24 @@ const ECHO_BEHIND: u16 = 3;
 /// The lines, none longer than `width`.
 pub(super) fn lines(node: &Node, view: &View<'_>, width: usize, height: usize) -> Vec<Line<'static>> {
     let palette = view.palette;
-    let mut below = scan(node, view);
-    below.extend(ground(node, palette));
-    below.extend(heartbeat(node, view));
-    below.extend(link(node, palette));
-    below.extend(vehicle(node, view));
-    below.extend(bus(view));
-    // Health takes the room that is left.
-    let mut lines = health(node, palette, width, height.saturating_sub(below.len()));
-    lines.append(&mut below);
+    let groups = [
+        scan(node, view),
+        ground(node, palette),
+        heartbeat(node, view),
+        link(node, palette),
+        vehicle(node, view),
+        bus(view),
+    ];
+    let needed: usize = groups.iter().map(Vec::len).sum();
+    // Health takes the room that is left, and the groups stand apart if there is still more.
+    let mut lines = health(node, view, width, height.saturating_sub(needed));
+    let apart = lines.len() + needed + groups.len() <= height;
+    for group in groups.into_iter().filter(|group| !group.is_empty()) {
+        if apart {
+            lines.push(Line::default());
+        }
+        lines.extend(group);
+    }
     lines
 }
 
@@ -45,9 +54,14 @@ fn marked(palette: Palette, name: &'static str, severity: Severity, text: impl I
 }
 
 /// Level and reasons: those of the heartbeat, and the level of the newest scan.
-fn health(node: &Node, palette: Palette, width: usize, height: usize) -> Vec<Line<'static>> {
-    let told = node.heartbeat().map(|(heartbeat, _)| heartbeat.health);
-    let Some(health) = told else { return vec![entry(palette, "HEALTH", "not told yet")] };
+fn health(node: &Node, view: &View<'_>, width: usize, height: usize) -> Vec<Line<'static>> {
+    let palette = view.palette;
+    let Some((heartbeat, at_ns)) = node.heartbeat() else { return vec![entry(palette, "HEALTH", "not told yet")] };
+    let health = heartbeat.health;
+    if view.now_ns.saturating_sub(*at_ns) > HEARTBEAT_TIMEOUT_NS {
+        let text = format!("not known (last: {})", words::level_name(health.level).to_uppercase());
+        return vec![marked(palette, "HEALTH", Severity::Bad, text)];
+    }
     let level = node.scan().map_or(HealthLevel::Ok, |scan| scan.header.health).max(health.level);
     let severity = severity(level);
     let text = format!("{} {}", sign(severity), words::level_name(level).to_uppercase());
@@ -55,7 +69,7 @@ fn health(node: &Node, palette: Palette, width: usize, height: usize) -> Vec<Lin
         Span::styled(format!("{:<8}", "HEALTH"), palette.heading()),
         Span::styled(text, palette.word(severity)),
     ])];
-    let reasons = reasons(health);
+    let reasons = words::reasons_in_words(health);
     let room = height.saturating_sub(1);
     for (index, reason) in reasons.iter().enumerate() {
         let wrapped = wrap(reason, width.saturating_sub(3));
@@ -71,10 +85,6 @@ fn health(node: &Node, palette: Palette, width: usize, height: usize) -> Vec<Lin
         }
     }
     lines
-}
-
-fn reasons(health: Health) -> Vec<&'static str> {
-    words::reasons_in_words(health)
 }
 
 fn scan(node: &Node, view: &View<'_>) -> Vec<Line<'static>> {
@@ -104,23 +114,23 @@ fn ground(node: &Node, palette: Palette) -> Vec<Line<'static>> {
     let Some(ground) = scan.ground else { return vec![marked(palette, "GROUND", Severity::Care, "no plane found")] };
     let height_m = f64::from(ground.camera_height_mm) / 1000.0;
     let (pitch, roll) = (words::tilt_deg(ground.pitch_down), words::tilt_deg(ground.roll));
-    let text = format!("{height_m:.2} m, {pitch:.1}° down, {roll:.1}° roll");
-    let mut lines = vec![entry(palette, "GROUND", text)];
-    if ground.age_frames > 0 {
-        lines.push(marked(palette, "", Severity::Care, format!("held for {} scans", ground.age_frames)));
-    }
-    lines
+    let first = match ground.age_frames {
+        0 => entry(palette, "GROUND", format!("camera {height_m:.2} m above it")),
+        age => marked(palette, "GROUND", Severity::Care, format!("{height_m:.2} m, held for {age} scans")),
+    };
+    vec![first, entry(palette, "", format!("{pitch:.1}° down, {roll:.1}° roll"))]
 }
 
 fn heartbeat(node: &Node, view: &View<'_>) -> Vec<Line<'static>> {
     let Some((heartbeat, at_ns)) = node.heartbeat() else {
         return vec![marked(view.palette, "HEART", Severity::Bad, "no beat yet")];
     };
-    let ago_s = view.now_ns.saturating_sub(*at_ns) as f64 * 1.0e-9;
+    let ago_ns = view.now_ns.saturating_sub(*at_ns);
+    let ago_s = ago_ns as f64 * 1.0e-9;
     // The sign changes with each beat.
     let beat = if node.heartbeats().is_multiple_of(2) { "♥" } else { "♡" };
     let state = words::state_name(heartbeat.state);
-    let severity = if ago_s > 0.3 { Severity::Bad } else { Severity::Good };
+    let severity = if ago_ns > HEARTBEAT_TIMEOUT_NS { Severity::Bad } else { Severity::Good };
     let text = if ago_s < 1.0 { format!("{:.0} ms", ago_s * 1000.0) } else { format!("{ago_s:.1} s") };
     let text = format!("{beat} {state}, {text} ago");
     vec![if severity == Severity::Good {
@@ -147,7 +157,7 @@ fn vehicle(node: &Node, view: &View<'_>) -> Vec<Line<'static>> {
     let palette = view.palette;
     let ago = |at_ns: u64| view.now_ns.saturating_sub(at_ns);
     let mut lines = Vec::new();
-    let who = if view.echo.is_some() { " (by us)" } else { "" };
+    let who = if view.echo.is_some() { " (us)" } else { "" };
     lines.push(match node.motion() {
         None => entry(palette, "VEHICLE", "its motion was not told"),
         Some((_, at_ns)) if ago(*at_ns) > COMMAND_TIMEOUT_NS => {

@@ -108,7 +108,7 @@ pub fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
             let buffer = frame.buffer_mut();
             map::draw(scan, node.extent(), trusted, view.palette, map_area, buffer);
             let range_m = f64::from(node.extent().i_last) * f64::from(scan.end.cell_size_mm) / 1000.0;
-            sectors::draw(&scan.sectors, range_m.max(1.0), view.palette, sectors_area, buffer);
+            sectors::draw(&scan.sectors, range_m.max(1.0), trusted, view.palette, sectors_area, buffer);
         }
         let lines = details::lines(node, view, usize::from(details_area.width), usize::from(details_area.height));
         frame.render_widget(Paragraph::new(lines), details_area);
@@ -119,7 +119,7 @@ pub fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
         let waiting = Verdict { severity: Severity::Good, text: "waiting for the first frame".into(), hint: None };
         notice(frame, view, of_bus.as_ref().unwrap_or(&waiting), main);
     }
-    frame.render_widget(keys(view), keys_area);
+    frame.render_widget(keys(view, usize::from(keys_area.width)), keys_area);
 }
 
 impl View<'_> {
@@ -215,7 +215,7 @@ fn notice(frame: &mut Frame<'_>, view: &View<'_>, verdict: &Verdict, area: Rect)
     frame.render_widget(Paragraph::new(Text::from(lines)).alignment(Alignment::Center).block(block), place);
 }
 
-fn keys(view: &View<'_>) -> Line<'static> {
+fn keys(view: &View<'_>, width: usize) -> Line<'static> {
     let mut keys = vec![("q", "quit")];
     if view.listener.nodes().len() > 1 {
         keys.push(("Tab", "next node"));
@@ -228,14 +228,20 @@ fn keys(view: &View<'_>) -> Line<'static> {
         spans.push(Span::styled(format!(" {key} "), view.palette.heading()));
         spans.push(Span::raw(format!("{what} ")));
     }
-    let legend = if view.palette.colours {
-        "  █ obstacle  · free  blank: not seen"
-    } else {
-        "  █ obstacle  : free  blank: not seen"
-    };
-    spans.push(Span::styled(legend, view.palette.faint()));
     if view.echo.is_some() {
-        spans.push(Span::styled("  acting as controller", view.palette.heading()));
+        spans.push(Span::styled(" acting as controller ", view.palette.heading()));
+    }
+    // As much of the legend as there is room for.
+    let legend = ["█ obstacle", if view.palette.colours { "· free" } else { ": free" }, "blank: not seen"];
+    let mut used: usize = spans.iter().map(|span| span.content.chars().count()).sum();
+    for sign in legend {
+        used += 2 + sign.chars().count();
+        if used <= width {
+            spans.push(Span::styled(format!("  {sign}"), view.palette.faint()));
+        }
     }
     Line::from(spans)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,14 +1,25 @@
 //! The nearest obstacle in each direction, from left to right: a bar as long as the way is free, and the distance.
 
 use fencepost_core::map::{SECTOR_CLEAR_DM, SECTOR_UNKNOWN, SectorDistances};
-use ratatui::{buffer::Buffer, layout::Rect, text::Line};
+use ratatui::{
+    buffer::Buffer,
+    layout::Rect,
+    text::{Line, Span},
+};
 
 use super::palette::Palette;
 
 const EIGHTHS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// Draws the sectors; a full bar is `range_m`.
-pub(super) fn draw(sectors: &SectorDistances, range_m: f64, palette: Palette, area: Rect, buffer: &mut Buffer) {
+/// Draws the sectors; a full bar is `range_m`. In grey if they are not `trusted`.
+pub(super) fn draw(
+    sectors: &SectorDistances,
+    range_m: f64,
+    trusted: bool,
+    palette: Palette,
+    area: Rect,
+    buffer: &mut Buffer,
+) {
     let count = sectors.distance_dm.len() as u16;
     let width = area.width / count;
     if width < 3 || area.height < 3 {
@@ -16,8 +27,10 @@ pub(super) fn draw(sectors: &SectorDistances, range_m: f64, palette: Palette, ar
     }
     let left = area.x + (area.width - width * count) / 2;
     let (left_deg, right_deg) = (sectors.left_deg, sectors.left_deg - sectors.width_deg * f32::from(count));
-    let heading = format!("SECTORS  way to the nearest obstacle, m ({left_deg:.0}° left to {:.0}° right)", -right_deg);
-    Line::styled(heading, palette.heading()).render_at(area, buffer);
+    let heading = format!("SECTORS {left_deg:.0}° left to {:.0}° right", -right_deg);
+    let legend = "  metres to an obstacle, clr: clear, ?: not seen";
+    let line = Line::from(vec![Span::styled(heading, palette.heading()), Span::styled(legend, palette.faint())]);
+    buffer.set_line(area.x, area.y, &line, area.width);
 
     let bars = Rect { y: area.y + 1, height: area.height - 2, ..area };
     for (place, distance_dm) in sectors.distance_dm.iter().enumerate() {
@@ -26,9 +39,10 @@ pub(super) fn draw(sectors: &SectorDistances, range_m: f64, palette: Palette, ar
         let rows = f64::from(bars.height);
         let (text, style, length) = match *distance_dm {
             SECTOR_UNKNOWN => ("?".to_owned(), palette.faint(), 0.0),
-            SECTOR_CLEAR_DM => ("clear".to_owned(), palette.free(), rows),
+            SECTOR_CLEAR_DM => ("clr".to_owned(), palette.free(), rows),
             dm => (metres(dm), palette.obstacle(), f64::from(dm) / 10.0 / range_m * rows),
         };
+        let style = if trusted { style } else { palette.faint() };
         // Something near still has a bar.
         let eighths = if length > 0.0 { ((length * 8.0).round() as u16).clamp(1, 8 * bars.height) } else { 0 };
         for row in 0..bars.height {
@@ -47,14 +61,4 @@ pub(super) fn draw(sectors: &SectorDistances, range_m: f64, palette: Palette, ar
 /// Decimetres in metres, three characters.
 fn metres(dm: u8) -> String {
     if dm < 100 { format!("{}.{}", dm / 10, dm % 10) } else { format!("{}", (f64::from(dm) / 10.0).round()) }
-}
-
-trait RenderAt {
-    fn render_at(&self, area: Rect, buffer: &mut Buffer);
-}
-
-impl RenderAt for Line<'_> {
-    fn render_at(&self, area: Rect, buffer: &mut Buffer) {
-        buffer.set_line(area.x, area.y, self, area.width);
-    }
 }
