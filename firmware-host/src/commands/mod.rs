@@ -3,6 +3,7 @@
 mod can;
 mod check;
 mod demo;
+mod listen;
 mod optics;
 mod replay;
 mod run;
@@ -10,6 +11,7 @@ mod run;
 pub use can::decode;
 pub use check::check;
 pub use demo::demo;
+pub use listen::listen;
 pub use replay::replay;
 pub use run::run;
 
