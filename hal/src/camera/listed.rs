@@ -184,16 +184,21 @@ impl core::fmt::Display for OfferedSize {
     }
 }
 
-/// The formats in one line.
+/// The formats in one line: those that pictures are taken from with their sizes, and how many others there are.
 pub fn formats_in_words(formats: &[OfferedFormat]) -> String {
-    if formats.is_empty() {
-        return "nothing".to_owned();
+    let known = formats.iter().filter(|format| format.format.is_some());
+    let mut words: Vec<String> = known
+        .map(|format| {
+            let sizes: Vec<String> = format.sizes.iter().map(ToString::to_string).collect();
+            format!("{} {}", format.fourcc, sizes.join(", "))
+        })
+        .collect();
+    match formats.len() - words.len() {
+        0 if words.is_empty() => words.push("nothing".to_owned()),
+        0 => {}
+        others => words.push(format!("{others} formats that pictures cannot be taken from")),
     }
-    let sizes = |format: &OfferedFormat| {
-        let sizes: Vec<String> = format.sizes.iter().map(ToString::to_string).collect();
-        format!("{} {}", format.fourcc, sizes.join(", "))
-    };
-    formats.iter().map(sizes).collect::<Vec<_>>().join("; ")
+    words.join("; ")
 }
 
 #[cfg(test)]
@@ -231,8 +236,13 @@ mod tests {
         let range = OfferedSize { min: (2, 1), max: (1920, 1080), step: (2, 1), rates_hz: vec![] };
         assert!(small.holds(640, 480) && !small.holds(320, 240));
         assert!(range.holds(512, 384) && !range.holds(513, 384) && !range.holds(1922, 10));
-        let words = formats_in_words(&[format("GREY", vec![small.clone(), small]), format("H264", vec![range])]);
-        assert_eq!(words, "GREY 640 x 480, 640 x 480; H264 2 x 1 to 1920 x 1080");
+        let unknown = format("H264", vec![range.clone()]);
+        let words =
+            formats_in_words(&[format("GREY", vec![small.clone(), small]), unknown, format("Y16", vec![range])]);
+        assert_eq!(
+            words,
+            "GREY 640 x 480, 640 x 480; Y16 2 x 1 to 1920 x 1080; 1 formats that pictures cannot be taken from"
+        );
         assert_eq!(formats_in_words(&[]), "nothing");
     }
 

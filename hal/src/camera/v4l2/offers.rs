@@ -46,13 +46,20 @@ pub(super) fn formats(file: &File, queue: QueueType) -> Vec<OfferedFormat> {
     let format = |description: ioctl::FmtDesc| {
         let fourcc: [u8; 4] = description.pixelformat.into();
         OfferedFormat {
-            fourcc: String::from_utf8_lossy(&fourcc).trim_end().to_owned(),
+            fourcc: name(fourcc),
             description: description.description,
             format: PixelFormat::from_fourcc(fourcc),
             sizes: sizes(file, description.pixelformat),
         }
     };
     descriptions.map(format).collect()
+}
+
+/// The four characters as text. A format with its bytes the other way round has the highest bit set.
+fn name([a, b, c, d]: [u8; 4]) -> String {
+    let characters = [a, b, c, d & 0x7F];
+    let order = if d & 0x80 == 0 { "" } else { "-BE" };
+    format!("{}{order}", String::from_utf8_lossy(&characters).trim_end())
 }
 
 /// Every rate of pictures of one size.
