@@ -26,6 +26,7 @@ pub mod live;
 pub mod output;
 pub mod paint;
 pub mod pipeline;
+pub mod record;
 pub mod report;
 pub mod source;
 pub mod stopwatch;
@@ -58,6 +59,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Replay(args) => commands::replay(&args, &mut console),
         Command::Run(args) => commands::run(&args, &mut console),
         Command::Check(args) => commands::check(&args, &mut console),
+        Command::Record(args) => commands::record_rig(&args, &mut console),
+        Command::Cameras(args) => commands::cameras(&args, &mut console),
         Command::Can(CanCommand::Decode(args)) => commands::decode(&args, &console),
     };
     match result {
