@@ -5,7 +5,7 @@ use crate::error::ConfigError;
 
 /// Height, tilt and place of the left camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct Mount {
     /// Height of the left camera above the ground, metres; `None` if not known.
     pub height_m: Option<f32>,
@@ -14,13 +14,10 @@ pub struct Mount {
     /// Roll about the optical axis, degrees; positive if the camera leans to the right.
     pub roll_deg: f32,
     /// The left camera's place ahead of the origin of the vehicle frame, metres.
-    #[cfg_attr(feature = "serde", serde(default))]
     pub forward_m: f32,
     /// The left camera's place to the left of the origin of the vehicle frame, metres.
-    #[cfg_attr(feature = "serde", serde(default))]
     pub left_m: f32,
     /// Heading of the left camera against that of the vehicle, degrees, positive to the left.
-    #[cfg_attr(feature = "serde", serde(default))]
     pub yaw_left_deg: f32,
 }
 

@@ -19,10 +19,11 @@ use fencepost_hal::{
 use super::{Ending, optics};
 use crate::{
     cli::CheckArgs,
-    config::Config,
+    config::{Config, Rig},
     console::Console,
     detector::{self, ProgramDetector},
     error::Failure,
+    live::BusSettings,
     source::Source,
     summary, words,
 };
@@ -95,9 +96,33 @@ fn check_calibration(args: &CheckArgs, config: &Config, console: &mut Console) -
 }
 
 fn check_configuration(args: &CheckArgs, console: &mut Console) -> Result<Ending, Failure> {
-    let config = Config::read(&args.path)?;
-    let file = Some(args.path.as_path());
-    let wrong = |error| Failure::config(error, file);
+    let (config, mistakes) = Config::read_all(&args.path, true)?;
+    let file = args.path.display();
+    for mistake in &mistakes {
+        let field = if mistake.field.is_empty() { String::new() } else { format!("{} ", mistake.field) };
+        let place = mistake.line.map_or_else(|| file.to_string(), |line| format!("{file}, line {line}"));
+        console.error(Failure::usage(format!("{field}{}", mistake.problem)).at(place).mend(&mistake.mend));
+    }
+    match mistakes.len() {
+        0 => {}
+        1 => return Err(Failure::usage(format!("there is a mistake in {file}"))),
+        count => return Err(Failure::usage(format!("there are {count} mistakes in {file}"))),
+    }
+    let mut text = String::new();
+    line(&mut text, "configuration", &file);
+    if config.rig.pairs.is_empty() {
+        check_settings(&mut text, &config)?;
+    } else {
+        check_rig(&mut text, &config, console)?;
+    }
+    let all = toml::to_string(&config.settings_for(640)).map_err(|error| Failure::work(error.to_string()))?;
+    let _ = write!(text, "\nAll settings of the detector, with those that were not set:\n\n{all}");
+    console.result(text.trim_end());
+    Ok(Ending::Good)
+}
+
+/// A configuration without cameras.
+fn check_settings(text: &mut String, config: &Config) -> Result<(), Failure> {
     // A camera as it is often used; the settings do not depend on it.
     let pair = RectifiedPair {
         width: 640,
@@ -110,11 +135,11 @@ fn check_configuration(args: &CheckArgs, console: &mut Console) -> Result<Ending
     };
     let settings = config.settings_for(pair.width);
     let mount = config.mount.unwrap_or_default();
-    detector::lock().configure(&settings, &StereoCalibration::Rectified(pair), &mount).map_err(wrong)?;
-    let mut text = String::new();
-    line(&mut text, "configuration", args.path.display());
+    detector::lock()
+        .configure(&settings, &StereoCalibration::Rectified(pair), &mount)
+        .map_err(|error| Failure::config(error, config.file.as_deref()))?;
     line(
-        &mut text,
+        text,
         "disparities",
         match config.has_disparities() {
             true => settings.matching.disparities.to_string(),
@@ -122,19 +147,65 @@ fn check_configuration(args: &CheckArgs, console: &mut Console) -> Result<Ending
         },
     );
     line(
-        &mut text,
+        text,
         "mount",
         match config.mount {
             Some(mount) => summary::mount_words(&mount),
             None => "as the recording says".to_string(),
         },
     );
-    describe_bus(&mut text, &config)?;
-    line(&mut text, "memory", format_args!("{} in this program", words::bytes(size_of::<ProgramDetector>())));
-    let all = toml::to_string(&settings).map_err(|error| Failure::work(error.to_string()))?;
-    let _ = write!(text, "\nAll settings, with those that were not set:\n\n{all}");
-    console.result(text.trim_end());
-    Ok(Ending::Good)
+    describe_bus(text, config)?;
+    line(text, "memory", format_args!("{} in this program", words::bytes(size_of::<ProgramDetector>())));
+    Ok(())
+}
+
+/// A configuration with cameras: what each pair will see, and how busy the bus will be at most.
+fn check_rig(text: &mut String, config: &Config, console: &mut Console) -> Result<(), Failure> {
+    let Rig { bus, run, pairs } = &config.rig;
+    for pair in pairs {
+        pair.warnings.iter().for_each(|warning| console.warn(format_args!("pair {}: {warning}", pair.name)));
+        let _ = writeln!(text, "\npair {}", pair.name);
+        line(text, "pictures", pair.source.describe());
+        let files: Vec<_> = pair.calibration_files.iter().map(|file| file.display().to_string()).collect();
+        if !files.is_empty() {
+            line(text, "calibration", files.join(", "));
+        }
+        describe_view(text, &pair.calibration, &pair.mount, config)?;
+    }
+    let _ = writeln!(text, "\nloop");
+    line(text, "deadline", format_args!("{} ms from exposure to the last CAN frame", run.deadline_ms));
+    line(text, "stale", format_args!("after {} ms", run.stale_ms));
+    line(
+        text,
+        "real time",
+        match run.priority {
+            0 => "not asked for".to_string(),
+            priority => format!(
+                "SCHED_FIFO, priority {priority}; memory {}",
+                if run.lock_memory { "locked" } else { "not locked" }
+            ),
+        },
+    );
+    let wire = WireConfig::new(config.wire).map_err(|error| Failure::config(error, config.file.as_deref()))?;
+    let rate_hz = pairs.iter().map(|pair| pair.source.rate_hz()).fold(0.0, f32::max).ceil() as u16;
+    let permille = max_load_permille(&wire, bus.bitrate, rate_hz);
+    line(
+        text,
+        "bus",
+        format_args!(
+            "{}, at most {:.1} % of {} kbit/s at {rate_hz} scans a second",
+            if bus.interface == BusSettings::NONE { "none: nothing is sent" } else { &bus.interface },
+            f64::from(permille) / 10.0,
+            bus.bitrate / 1000,
+        ),
+    );
+    if permille > 1000 {
+        console.warn(
+            "the largest scans do not fit on the bus at this rate: some will be abandoned; lower wire.max_cell_frames, or \
+             raise the bit rate",
+        );
+    }
+    Ok(())
 }
 
 /// Reads every pair, and says what is wrong with those that cannot be used; gives their number.

@@ -194,7 +194,11 @@ impl<'a> Reader<'a> {
         problem: impl Into<String>,
         mend: impl Into<String>,
     ) {
-        self.mistakes.push(Mistake { line, field: field.into(), problem: problem.into(), mend: mend.into() });
+        let mistake = Mistake { line, field: field.into(), problem: problem.into(), mend: mend.into() };
+        // A check is asked again without what it refused, and may say once more what has nothing to do with that.
+        if !self.mistakes.contains(&mistake) {
+            self.mistakes.push(mistake);
+        }
     }
 
     /// Notes a mistake of a setting of `section`, at its line if it is there.

@@ -359,6 +359,16 @@ impl RigPair {
 }
 
 impl RigSource {
+    /// Pairs of pictures a second; 30 where only the camera knows.
+    pub fn rate_hz(&self) -> f32 {
+        const USUAL_HZ: f32 = 30.0;
+        match self {
+            Self::Camera(camera) => camera.rate_hz.unwrap_or(USUAL_HZ),
+            Self::Recording(recording) => recording.rate_hz.unwrap_or(USUAL_HZ),
+            Self::Scene(scene) => scene.rate_hz,
+        }
+    }
+
     /// What it is, in words.
     pub fn describe(&self) -> String {
         let path = |path: &Option<PathBuf>| path.as_ref().map_or_else(String::new, |path| path.display().to_string());

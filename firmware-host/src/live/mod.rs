@@ -192,18 +192,14 @@ where
             return Err(failure);
         }
         observe(Observation::Started);
-        let mut counts = Vec::new();
+        let mut liveness = Liveness::default();
         while !bus_thread.is_finished() {
             thread::sleep(LOOK);
             while let Some(event) = events.next() {
                 observe(Observation::Event(&event));
             }
-            let before = std::mem::take(&mut counts);
-            counts.extend(places.iter().map(|place| place.alive.load(Ordering::Relaxed)));
-            counts.push(bus_alive.load(Ordering::Relaxed));
             let ended = |index: usize| pair_threads.get(index).is_some_and(|thread| thread.is_finished());
-            let moved = |(index, (new, old)): (usize, (&u64, &u64))| new != old || ended(index);
-            let alive = before.len() == counts.len() && counts.iter().zip(&before).enumerate().all(moved);
+            let alive = liveness.look(places.iter().map(|place| &place.alive).chain([&bus_alive]), ended);
             let progress = progress.lock().map(|progress| *progress).unwrap_or_default();
             observe(Observation::Look { progress, alive });
         }
@@ -214,6 +210,22 @@ where
         }
         Ok(RunReport { pairs, bus, events_dropped: events.dropped() })
     })
+}
+
+/// The counts of the threads when they were last looked at.
+#[derive(Debug, Default)]
+struct Liveness([u64; MAX_PAIRS + 1]);
+
+impl Liveness {
+    /// Whether every count has risen since the last look. A thread that has ended need not.
+    fn look<'a>(&mut self, counts: impl Iterator<Item = &'a AtomicU64>, ended: impl Fn(usize) -> bool) -> bool {
+        let mut all = true;
+        for (index, (count, before)) in counts.zip(&mut self.0).enumerate() {
+            let now = count.load(Ordering::Relaxed);
+            all &= std::mem::replace(before, now) != now || ended(index);
+        }
+        all
+    }
 }
 
 const fn raw_size(calibration: &StereoCalibration) -> (u32, u32) {

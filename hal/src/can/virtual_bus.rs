@@ -50,7 +50,8 @@ impl VirtualBus {
         if index == nodes.len() {
             nodes.push(None);
         }
-        nodes[index] = Some(Queue::default());
+        // All the memory that it will ever need: nobody who sends waits for more.
+        nodes[index] = Some(Queue { entries: VecDeque::with_capacity(self.capacity), dropped: 0 });
         VirtualNode { bus: self.clone(), index }
     }
 

@@ -69,12 +69,12 @@ impl Writer {
         self.size
     }
 
-    /// Hands a picture over, stamped with the time of now.
+    /// Hands a picture over, stamped with the time of now. A compressed one may be shorter than the format.
     ///
     /// # Panics
-    /// When it has another size than the format, or the device does not take it.
+    /// When it is longer than the format, or the device does not take it.
     pub fn write(&mut self, picture: &[u8]) {
-        assert_eq!(picture.len(), self.size, "bytes of a picture");
+        assert!(picture.len() <= self.size, "{} bytes are more than {} of the format", picture.len(), self.size);
         let written = self.device.write(picture).expect("the device takes the picture");
         assert_eq!(written, picture.len(), "the device takes the whole picture");
     }

@@ -1,5 +1,10 @@
 //! The bus thread: joins what the pairs saw, says it on the bus, and listens to the vehicle's controller.
 
+mod judge;
+mod report;
+
+pub use report::{BusReport, CommandReport, SentReport};
+
 use std::{
     sync::{
         Mutex,
@@ -18,11 +23,10 @@ use fencepost_core::{
     },
 };
 use fencepost_hal::{
-    can::{BusCondition, BusError, BusErrorKind, CanBus, ControllerState, Pump, TransmitCounters, Transmitter},
+    can::{BusCondition, BusError, BusErrorKind, CanBus, Pump, Transmitter},
     clock::monotonic_ns,
 };
 use heapless::Vec as FixedVec;
-use serde::Serialize;
 
 use super::{
     event::{Events, Severity},
@@ -46,54 +50,6 @@ const RETRY: Duration = Duration::from_millis(1);
 const LISTEN_FRAMES: usize = 256;
 /// How long the bus has for what still waits, and for the last heartbeat.
 const FAREWELL_NS: u64 = 100_000_000;
-
-/// What went over the bus, and how late.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct BusReport {
-    /// Scans encoded.
-    pub scans: u64,
-    /// Detections that a newer one of the same pair replaced before they could be sent.
-    pub overtaken: u64,
-    /// Scans whose last frame was handed over later than the deadline, or never.
-    pub late: u64,
-    /// From exposure to the last CAN frame.
-    pub latency: LatencySummary,
-    /// What became of heartbeats and scans.
-    #[serde(flatten)]
-    pub sent: SentReport,
-    /// Messages of the controller that were missing, repeated, damaged or refused.
-    pub commands: CommandReport,
-}
-
-/// Counts of frames.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct SentReport {
-    /// Frames that the bus took.
-    pub frames: u64,
-    /// Heartbeats among them.
-    pub heartbeats: u64,
-    /// Scans that the bus took whole.
-    pub whole_scans: u64,
-    /// Scans that were abandoned.
-    pub abandoned_scans: u64,
-    /// Times that the bus was full.
-    pub full: u64,
-    /// Times that the bus was down, gone or off.
-    pub no_bus: u64,
-}
-
-/// What was wrong with the controller's messages.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct CommandReport {
-    /// Missing by their counters.
-    pub lost: u32,
-    /// Came more than once.
-    pub repeated: u32,
-    /// Checksum did not fit.
-    pub crc_errors: u32,
-    /// Refused for another reason.
-    pub refused: u32,
-}
 
 /// What the bus thread last said, for whoever watches the loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -378,76 +334,6 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         self.watch.see(HealthReason::Late, HealthLevel::Degraded, now_ns);
     }
 
-    /// Everything that only the loop can know.
-    fn judge(&mut self, now_ns: u64) {
-        self.judge_pairs(now_ns);
-        self.judge_bus(now_ns);
-        self.judge_commands(now_ns);
-        self.status.health = joined(self.scan_health_now(), self.watch.health(now_ns));
-    }
-
-    /// Before the first scan nothing is known.
-    fn scan_health_now(&self) -> Health {
-        if self.status.last_scan.is_none() { Health::default() } else { self.scan_health }
-    }
-
-    fn judge_pairs(&mut self, now_ns: u64) {
-        let stale_ns = u64::from(self.settings.stale_ms) * 1_000_000;
-        let since_ns = |pair: &PairState| now_ns.saturating_sub(pair.exposure_ns.unwrap_or(self.start_ns));
-        let is_stale = |pair: &PairState| since_ns(pair) > stale_ns && pair.trouble != Some(Trouble::Ended);
-        // A rig that still sees something with one of its pairs is degraded; what the others do not see is unknown in its map.
-        let some_good = self.pairs().any(|pair| pair.trouble.is_none() && !is_stale(pair));
-        let limit = if some_good { HealthLevel::Degraded } else { HealthLevel::Fault };
-        let trouble = self.pairs().filter_map(|pair| pair.trouble).filter(|trouble| *trouble != Trouble::Ended);
-        let worst = trouble.map(Trouble::level).max();
-        let stale = self.pairs().any(is_stale);
-        if let Some(level) = worst {
-            self.watch.see(HealthReason::MissingPicture, level.min(limit), now_ns);
-        }
-        if stale {
-            self.watch.see(HealthReason::StalePicture, HealthLevel::Blind.min(limit), now_ns);
-        }
-    }
-
-    fn judge_bus(&mut self, now_ns: u64) {
-        let before = std::mem::replace(&mut self.condition, self.transmitter.bus().condition());
-        let now = self.condition;
-        let rose = now.errors > before.errors
-            || now.no_acknowledgement > before.no_acknowledgement
-            || now.restarts > before.restarts
-            || now.overflows > before.overflows;
-        if rose || now.controller >= ControllerState::ErrorPassive {
-            self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
-        }
-        if now.controller != before.controller {
-            let (severity, words) = match now.controller {
-                ControllerState::ErrorActive => (Severity::Note, "takes part in full again"),
-                ControllerState::Warning => (Severity::Warning, "counts many errors; look at cable, ends and bit rate"),
-                ControllerState::ErrorPassive => (
-                    Severity::Warning,
-                    "is error-passive; look at cable, ends, bit rate and whether another node is there",
-                ),
-                ControllerState::BusOff => {
-                    (Severity::Warning, "is off the bus; look at the cable, and set restart-ms so that it comes back")
-                }
-            };
-            self.shared.events.tell(now_ns, severity, format_args!("bus: the CAN controller {words}"));
-        }
-    }
-
-    fn judge_commands(&mut self, now_ns: u64) {
-        let before = std::mem::replace(&mut self.command_statistics, *self.commands.statistics());
-        let now = self.command_statistics;
-        let damaged = now.lost > before.lost || now.crc_errors > before.crc_errors || now.refused > before.refused;
-        let silent = self.motion_heard && self.commands.vehicle_motion(now_ns).is_none();
-        if damaged || silent {
-            self.watch.see(HealthReason::CommandTrouble, HealthLevel::Degraded, now_ns);
-        }
-        if self.echo.is_missing(now_ns) {
-            self.watch.see(HealthReason::EchoMissing, HealthLevel::Degraded, now_ns);
-        }
-    }
-
     /// At 10 Hz, and at once when there are news.
     fn heartbeat_if_due(&mut self, now_ns: u64) {
         let news = self.status.health != self.said && now_ns.saturating_sub(self.last_heartbeat_ns) >= NEWS_NS;
@@ -493,35 +379,6 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         pump
     }
 
-    fn say_bus_trouble(&mut self, kind: BusErrorKind, now_ns: u64) {
-        if self.bus_trouble != Some(kind) {
-            self.bus_trouble = Some(kind);
-            match self.transmitter.error() {
-                Some(error) => {
-                    self.shared.events.tell(now_ns, Severity::Warning, format_args!("bus: {error}"));
-                }
-                None => {
-                    self.shared.events.tell(now_ns, Severity::Warning, format_args!("bus: nothing can be sent"));
-                }
-            }
-        }
-    }
-
-    /// The side that listens has found that something is wrong.
-    fn bus_trouble(&mut self, kind: BusErrorKind, error: &B::Error, now_ns: u64) {
-        self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
-        if self.bus_trouble != Some(kind) {
-            self.bus_trouble = Some(kind);
-            self.shared.events.tell(now_ns, Severity::Warning, format_args!("bus: {error}"));
-        }
-    }
-
-    fn bus_good(&mut self, now_ns: u64) {
-        if self.bus_trouble.take().is_some() {
-            self.shared.events.tell(now_ns, Severity::Note, format_args!("bus: frames go out again"));
-        }
-    }
-
     fn tell_progress(&self) {
         // Whoever looks at it never holds it for long.
         if let Ok(mut progress) = self.shared.progress.try_lock() {
@@ -552,13 +409,10 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
     }
 
     fn finish(self) -> BusReport {
-        let TransmitCounters { frames, heartbeats, scans, abandoned_scans, full, no_bus, .. } =
-            *self.transmitter.counters();
-        let CommandStatistics { lost, repeated, crc_errors, refused } = *self.commands.statistics();
         BusReport {
             latency: self.latency.summary(),
-            sent: SentReport { frames, heartbeats, whole_scans: scans, abandoned_scans, full, no_bus },
-            commands: CommandReport { lost, repeated, crc_errors, refused },
+            sent: self.transmitter.counters().into(),
+            commands: self.commands.statistics().into(),
             ..self.report
         }
     }
