@@ -58,6 +58,10 @@ pub enum Command {
     Run(RunArgs),
     /// Say what a recording, a calibration or a configuration holds, and what the detector can see with it.
     Check(CheckArgs),
+    /// Record what a pair of cameras of a rig sees, without loss, to replay it.
+    Record(RecordArgs),
+    /// List the cameras of this machine, what they offer, and which of them would make a pair.
+    Cameras(CamerasArgs),
     /// Work with CAN logs.
     #[command(subcommand)]
     Can(CanCommand),
@@ -159,6 +163,44 @@ pub struct CheckArgs {
     /// Settings of the detector.
     #[command(flatten)]
     pub detector: DetectorArgs,
+}
+
+/// Arguments of `record`.
+#[derive(Debug, Args)]
+pub struct RecordArgs {
+    /// The rig in TOML.
+    #[arg(long, value_name = "FILE")]
+    pub config: PathBuf,
+    /// Folder of the recording; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Name of the pair, where the rig has more than one.
+    #[arg(long, value_name = "NAME")]
+    pub pair: Option<String>,
+    /// Stop after so many pairs of pictures.
+    #[arg(long, value_name = "N", conflicts_with = "seconds")]
+    pub frames: Option<u64>,
+    /// Stop after so many seconds.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// Pairs in memory between camera and disk; 64 MB of them if left out.
+    #[arg(long, value_name = "N", value_parser = pairs)]
+    pub queue: Option<usize>,
+}
+
+fn pairs(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(pairs @ 1..=10_000) => Ok(pairs),
+        _ => Err("give a number from 1 to 10000".to_string()),
+    }
+}
+
+/// Arguments of `cameras`.
+#[derive(Debug, Default, Args)]
+pub struct CamerasArgs {
+    /// Everything that is known of them, as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What to do with a CAN log.

@@ -29,6 +29,7 @@ pub mod listen;
 pub mod output;
 pub mod paint;
 pub mod pipeline;
+pub mod record;
 pub mod report;
 pub mod scans;
 pub mod source;
@@ -62,6 +63,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Replay(args) => commands::replay(&args, &mut console),
         Command::Run(args) => commands::run(&args, &mut console),
         Command::Check(args) => commands::check(&args, &mut console),
+        Command::Record(args) => commands::record_rig(&args, &mut console),
+        Command::Cameras(args) => commands::cameras(&args, &mut console),
         Command::Can(CanCommand::Decode(args)) => commands::decode(&args, &console),
         Command::Listen(args) => commands::listen(&args, &console),
     };

@@ -1,17 +1,21 @@
 //! What the program does, a module for each command.
 
+mod cameras;
 mod can;
 mod check;
 mod demo;
 mod listen;
 mod optics;
+mod record;
 mod replay;
 mod run;
 
+pub use cameras::cameras;
 pub use can::decode;
 pub use check::check;
 pub use demo::demo;
 pub use listen::listen;
+pub use record::record_rig;
 pub use replay::replay;
 pub use run::run;
 

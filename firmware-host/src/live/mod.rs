@@ -31,6 +31,8 @@ pub use pair::{PairPlan, PairReport};
 pub(crate) use realtime::check_cpu;
 pub use service::{Systemd, stop_at_signals};
 pub use settings::{BusSettings, MAX_PAIRS, RunSettings};
+#[cfg(not(feature = "v4l"))]
+pub(crate) use source::no_v4l;
 pub use source::{RigCamera, RigCameraError};
 
 use std::{

@@ -84,7 +84,7 @@ fn open_camera(_: &fencepost_hal::camera::CameraSettings) -> Result<RigCamera, F
 
 /// What to do where the program was built without real cameras.
 #[cfg(not(feature = "v4l"))]
-pub(super) fn no_v4l() -> Failure {
+pub(crate) fn no_v4l() -> Failure {
     Failure::usage("this program was built without V4L2 cameras").mend(
         "on Debian: apt install libclang-dev linux-libc-dev, then cargo build --release --features v4l (docs/deploy.md)",
     )

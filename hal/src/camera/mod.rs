@@ -2,6 +2,7 @@
 
 mod fault;
 mod format;
+mod listed;
 mod memory;
 mod paced;
 pub mod pairing;
@@ -12,6 +13,7 @@ pub mod v4l2;
 
 pub use fault::{FaultyCamera, FaultyCounts, FaultyError, Sides};
 pub use format::PixelFormat;
+pub use listed::{ListedDevice, OfferedControl, OfferedFormat, OfferedSize, formats_in_words, proposals};
 pub use memory::MemoryCamera;
 pub use paced::PacedCamera;
 pub use settings::{CameraDevices, CameraSettings, CameraSettingsError, PackedLayout};

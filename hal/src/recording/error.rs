@@ -131,6 +131,20 @@ pub enum RecordingWarning {
         /// How many there are.
         count: usize,
     },
+    /// The last line of a list is torn off: whoever wrote it was stopped.
+    TornLine {
+        /// The file.
+        file: PathBuf,
+        /// Line, from 1.
+        line: usize,
+    },
+    /// The last frame has a right picture only: whoever wrote it was stopped.
+    Unfinished {
+        /// The frame.
+        frame: u32,
+        /// The right picture.
+        path: PathBuf,
+    },
     /// `data.csv` is not there; the times are taken from the names of the pictures.
     ListMissing(PathBuf),
     /// Pictures without a partner in the other camera are left out.
@@ -279,6 +293,17 @@ impl fmt::Display for RecordingWarning {
                 "{}: the time of frame {frame} is not after the one before it ({count} such frames); the frames come in the \
                  order of the recording nevertheless, mend the times",
                 file.display()
+            ),
+            Self::TornLine { file, line } => write!(
+                f,
+                "{}: line {line}, the last one, is torn off and left out; the recording was stopped, or the disk was full",
+                file.display()
+            ),
+            Self::Unfinished { frame, path } => write!(
+                f,
+                "{}: is the last picture and has no left partner, frame {frame} is left out; the recording was stopped, or the \
+                 disk was full",
+                path.display()
             ),
             Self::ListMissing(path) => write!(
                 f,

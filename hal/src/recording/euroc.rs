@@ -61,7 +61,7 @@ fn pictures(camera: &Path, warnings: &mut Vec<RecordingWarning>) -> Result<Vec<(
     let list = camera.join("data.csv");
     let data = camera.join("data");
     match std::fs::read_to_string(&list) {
-        Ok(text) => parse(&list, &text, &data),
+        Ok(text) => parse(&list, &text, &data, warnings),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             warnings.push(RecordingWarning::ListMissing(list));
             let time = |path: &PathBuf| path.file_stem()?.to_str()?.parse().ok();
@@ -71,26 +71,47 @@ fn pictures(camera: &Path, warnings: &mut Vec<RecordingWarning>) -> Result<Vec<(
     }
 }
 
-fn parse(list: &Path, text: &str, data: &Path) -> Result<Vec<(u64, PathBuf)>, RecordingError> {
+fn parse(
+    list: &Path,
+    text: &str,
+    data: &Path,
+    warnings: &mut Vec<RecordingWarning>,
+) -> Result<Vec<(u64, PathBuf)>, RecordingError> {
     let mut pictures = Vec::new();
+    let lines = text.lines().count();
     for (index, line) in text.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
-        let error = |problem: &str| RecordingError::Line {
-            file: list.to_owned(),
-            line: index + 1,
-            problem: format!("{problem}; write `timestamp in ns,name of the picture`"),
-        };
-        let (time, name) = line.split_once(',').ok_or_else(|| error("there is no comma"))?;
-        let time = time.trim().parse().map_err(|_| error("the timestamp is not a whole number"))?;
-        let name = Path::new(name.trim());
-        // Only plain names: a list must not lead out of its folder.
-        if name.file_name().is_none_or(|plain| plain != name) {
-            return Err(error("the name is not that of a picture in data/"));
+        // A name may be torn off and still be one: then its picture is not there.
+        let unended = index + 1 == lines && !text.ends_with('\n') && !pictures.is_empty();
+        match row(list, index, line, data) {
+            Ok((_, path)) if unended && !path.exists() => {}
+            Ok(row) => {
+                pictures.push(row);
+                continue;
+            }
+            Err(_) if unended => {}
+            Err(error) => return Err(error),
         }
-        pictures.push((time, data.join(name)));
+        warnings.push(RecordingWarning::TornLine { file: list.to_owned(), line: lines });
     }
     Ok(pictures)
+}
+
+fn row(list: &Path, index: usize, line: &str, data: &Path) -> Result<(u64, PathBuf), RecordingError> {
+    let error = |problem: &str| RecordingError::Line {
+        file: list.to_owned(),
+        line: index + 1,
+        problem: format!("{problem}; write `timestamp in ns,name of the picture`"),
+    };
+    let (time, name) = line.split_once(',').ok_or_else(|| error("there is no comma"))?;
+    let time = time.trim().parse().map_err(|_| error("the timestamp is not a whole number"))?;
+    let name = Path::new(name.trim());
+    // Only plain names: a list must not lead out of its folder.
+    if name.file_name().is_none_or(|plain| plain != name) {
+        return Err(error("the name is not that of a picture in data/"));
+    }
+    Ok((time, data.join(name)))
 }

@@ -20,6 +20,10 @@ pub(super) fn frames(
         let mut strangers: Vec<PathBuf> = Vec::new();
         let mut found = 0_usize;
         for path in list_folder(&folder)? {
+            // What was being written when the writer was stopped.
+            if path.extension().is_some_and(|extension| extension == "part") {
+                continue;
+            }
             match number(&path) {
                 Some(number) => {
                     found += 1;
@@ -34,6 +38,14 @@ pub(super) fn frames(
         if found == 0 {
             return Err(RecordingError::NoFrames(folder));
         }
+    }
+    // The writer makes the right picture first.
+    if pictures.len() > 1
+        && let Some(last) = pictures.last_entry()
+        && let [None, Some(path)] = last.get()
+    {
+        warnings.push(RecordingWarning::Unfinished { frame: *last.key(), path: path.clone() });
+        last.remove();
     }
     let numbers: Vec<u32> = pictures.keys().copied().collect();
     let times = times(&folder.join("times.txt"), &numbers, warnings)?;
@@ -81,8 +93,14 @@ fn times(file: &Path, numbers: &[u32], warnings: &mut Vec<RecordingWarning>) -> 
         Err(error) => return Err(RecordingError::io(file, &error)),
     };
     let mut listed = Vec::new();
+    let lines = text.lines().count();
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        listed.push(seconds(line.trim()).ok_or_else(|| RecordingError::Line {
+        let time = seconds(line.trim());
+        if time.is_none() && index + 1 == lines && !text.ends_with('\n') && !listed.is_empty() {
+            warnings.push(RecordingWarning::TornLine { file: file.to_owned(), line: lines });
+            break;
+        }
+        listed.push(time.ok_or_else(|| RecordingError::Line {
             file: file.to_owned(),
             line: index + 1,
             problem: format!(

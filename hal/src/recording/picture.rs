@@ -101,12 +101,25 @@ fn write(
     encode: impl FnOnce(&mut BufWriter<std::fs::File>) -> image::ImageResult<()>,
 ) -> Result<(), RecordingError> {
     let part = path.with_extension("part");
+    let written = write_part(&part, path, encode);
+    if written.is_err() {
+        // On a full disk every byte counts.
+        let _ = std::fs::remove_file(&part);
+    }
+    written
+}
+
+fn write_part(
+    part: &Path,
+    path: &Path,
+    encode: impl FnOnce(&mut BufWriter<std::fs::File>) -> image::ImageResult<()>,
+) -> Result<(), RecordingError> {
     let io = |error: std::io::Error| RecordingError::io(path, &error);
-    let mut to = BufWriter::new(std::fs::File::create(&part).map_err(io)?);
+    let mut to = BufWriter::new(std::fs::File::create(part).map_err(io)?);
     encode(&mut to).map_err(|error| RecordingError::Io { path: path.to_owned(), reason: error.to_string() })?;
     to.flush().map_err(io)?;
     drop(to);
-    std::fs::rename(&part, path).map_err(io)
+    std::fs::rename(part, path).map_err(io)
 }
 
 /// Luma of ITU-R BT.601, section 2.5.1: 0.299 R + 0.587 G + 0.114 B, rounded.

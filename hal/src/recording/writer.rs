@@ -10,6 +10,7 @@ use fencepost_core::picture::Picture;
 
 use super::error::RecordingError;
 use super::{Layout, mount, picture, picture_size};
+use crate::calibration::CalibrationFormat;
 use crate::camera::StereoPair;
 
 /// Writes a recording: KITTI's layout for a rectified pair, EuRoC's for a raw one.
@@ -30,39 +31,93 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// When the folder cannot be written or holds a recording already, or the calibration has a
-    /// [`Rectification`](fencepost_core::geometry::Rectification), for which EuRoC's layout has no place.
+    /// [`Rectification`](fencepost_core::geometry::Rectification), for which EuRoC's layout has no place: see
+    /// [`RecordingWriter::create_with_files`].
     pub fn create(
         folder: impl AsRef<Path>,
         calibration: &StereoCalibration,
         mount: &Mount,
     ) -> Result<Self, RecordingError> {
-        let folder = folder.as_ref().to_owned();
-        let unwritable =
-            |problem: &str| RecordingError::Unwritable { folder: folder.clone(), problem: problem.to_owned() };
-        if ["image_0", "mav0"].iter().any(|name| folder.join(name).exists()) {
-            return Err(unwritable("holds a recording already; choose another folder, or delete it"));
-        }
-        let layout = match calibration {
-            StereoCalibration::Rectified(pair) => {
-                make_folders(&folder, ["image_0", "image_1"])?;
-                write_text(&folder.join("calib.txt"), &calib_txt(pair))?;
-                write_text(&folder.join("times.txt"), "")?;
-                Layout::Kitti
+        let files = match calibration {
+            StereoCalibration::Rectified(pair) => vec![("calib.txt".to_owned(), calib_txt(pair).into_bytes())],
+            StereoCalibration::Raw(RawPair { rectification: Some(_), .. }) => {
+                return Err(RecordingError::Unwritable {
+                    folder: folder.as_ref().to_owned(),
+                    problem:
+                        "sensor.yaml has no place for a chosen rectification; leave it out, or give the files of the \
+                              calibration"
+                            .to_owned(),
+                });
             }
             StereoCalibration::Raw(pair) => {
-                if pair.rectification.is_some() {
-                    return Err(unwritable("sensor.yaml has no place for a chosen rectification; leave it out"));
-                }
-                make_folders(&folder, ["mav0/cam0/data", "mav0/cam1/data"])?;
-                for (camera, text) in sensor_yaml(pair).iter().enumerate() {
-                    let camera = folder.join(format!("mav0/cam{camera}"));
-                    write_text(&camera.join("sensor.yaml"), text)?;
-                    write_text(&camera.join("data.csv"), "#timestamp [ns],filename\n")?;
-                }
-                Layout::Euroc
+                let [left, right] = sensor_yaml(pair).map(String::into_bytes);
+                vec![("mav0/cam0/sensor.yaml".to_owned(), left), ("mav0/cam1/sensor.yaml".to_owned(), right)]
             }
         };
-        write_text(&folder.join("mount.json"), &mount::emit(mount))?;
+        Self::begin(folder.as_ref(), calibration, mount, &files)
+    }
+
+    /// As [`RecordingWriter::create`], with the files that the calibration was read from, as they are: whoever reads the
+    /// recording has exactly this calibration, a rectification that was chosen with it included. Without files the
+    /// calibration is written anew.
+    ///
+    /// # Errors
+    /// As [`RecordingWriter::create`], and when a file cannot be read.
+    pub fn create_with_files(
+        folder: impl AsRef<Path>,
+        calibration: &StereoCalibration,
+        mount: &Mount,
+        files: &[PathBuf],
+    ) -> Result<Self, RecordingError> {
+        if files.is_empty() {
+            return Self::create(folder, calibration, mount);
+        }
+        let read = |file: &PathBuf| fs::read(file).map_err(|error| RecordingError::io(file, &error));
+        let texts = files.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let sources: Vec<(&Path, String)> = files
+            .iter()
+            .zip(&texts)
+            .map(|(file, text)| (file.as_path(), String::from_utf8_lossy(text).into_owned()))
+            .collect();
+        let sources: Vec<(&Path, &str)> = sources.iter().map(|(file, text)| (*file, text.as_str())).collect();
+        let format = crate::calibration::Calibration::parse(&sources, Some(picture_size(calibration)))?.format;
+        let xml = sources.iter().any(|(_, text)| text.trim_start_matches('\u{feff}').trim_start().starts_with('<'));
+        let names = file_names(format, files.len(), xml).into_iter().map(str::to_owned);
+        Self::begin(folder.as_ref(), calibration, mount, &names.zip(texts).collect::<Vec<_>>())
+    }
+
+    fn begin(
+        folder: &Path,
+        calibration: &StereoCalibration,
+        mount: &Mount,
+        files: &[(String, Vec<u8>)],
+    ) -> Result<Self, RecordingError> {
+        let folder = folder.to_owned();
+        if ["image_0", "mav0"].iter().any(|name| folder.join(name).exists()) {
+            let problem = "holds a recording already; choose another folder, or delete it".to_owned();
+            return Err(RecordingError::Unwritable { folder, problem });
+        }
+        let layout = match calibration {
+            StereoCalibration::Rectified(_) => Layout::Kitti,
+            StereoCalibration::Raw(_) => Layout::Euroc,
+        };
+        let pictures = match layout {
+            Layout::Kitti => ["image_0", "image_1"],
+            Layout::Euroc => ["mav0/cam0/data", "mav0/cam1/data"],
+        };
+        make_folders(&folder, pictures)?;
+        for (name, text) in files {
+            write_whole(&folder.join(name), text)?;
+        }
+        match layout {
+            Layout::Kitti => write_whole(&folder.join("times.txt"), b"")?,
+            Layout::Euroc => {
+                for camera in ["mav0/cam0", "mav0/cam1"] {
+                    write_whole(&folder.join(camera).join("data.csv"), b"#timestamp [ns],filename\n")?;
+                }
+            }
+        }
+        write_whole(&folder.join("mount.json"), mount::emit(mount).as_bytes())?;
         Ok(Self { folder, layout, size: picture_size(calibration), frames: 0, last_ns: None })
     }
 
@@ -154,8 +209,24 @@ fn make_folders(folder: &Path, names: [&str; 2]) -> Result<(), RecordingError> {
         .try_for_each(|path| fs::create_dir_all(&path).map_err(|error| RecordingError::io(&path, &error)))
 }
 
-fn write_text(path: &Path, text: &str) -> Result<(), RecordingError> {
-    fs::write(path, text).map_err(|error| RecordingError::io(path, &error))
+/// Writes a file that appears under its name only when it is whole.
+fn write_whole(path: &Path, text: &[u8]) -> Result<(), RecordingError> {
+    let part = path.with_extension("part");
+    let written = fs::write(&part, text).and_then(|()| fs::rename(&part, path));
+    written.map_err(|error| RecordingError::io(path, &error))
+}
+
+/// Names under which the files of a calibration are found beside the pictures.
+const fn file_names(format: CalibrationFormat, count: usize, xml: bool) -> [&'static str; 2] {
+    match (format, count, xml) {
+        (CalibrationFormat::Kitti, ..) => ["calib.txt", "calib.txt"],
+        (CalibrationFormat::Euroc, ..) => ["mav0/cam0/sensor.yaml", "mav0/cam1/sensor.yaml"],
+        (CalibrationFormat::Ros, ..) => ["left.yaml", "right.yaml"],
+        (CalibrationFormat::OpenCv, 1, false) => ["calib.yaml", "calib.yaml"],
+        (CalibrationFormat::OpenCv, 1, true) => ["calib.xml", "calib.xml"],
+        (CalibrationFormat::OpenCv, _, false) => ["intrinsics.yml", "extrinsics.yml"],
+        (CalibrationFormat::OpenCv, _, true) => ["intrinsics.xml", "extrinsics.xml"],
+    }
 }
 
 fn append(path: &Path, text: &str) -> Result<(), RecordingError> {

@@ -11,7 +11,7 @@ use fencepost_core::geometry::{
     CameraModel, Distortion, Mount, RawPair, Rectification, RectifiedPair, StereoCalibration,
 };
 use fencepost_core::picture::Picture;
-use fencepost_hal::calibration::{CalibrationFormat, CalibrationProblem};
+use fencepost_hal::calibration::{Calibration, CalibrationFormat, CalibrationProblem};
 use fencepost_hal::camera::{Camera, StereoPair};
 use fencepost_hal::recording::{Layout, RecordedCamera, Recording, RecordingError, RecordingWarning, RecordingWriter};
 use image::{DynamicImage, ImageBuffer, Luma, LumaA, Rgb};

@@ -81,7 +81,9 @@ fn a_recording_can_be_read_after_every_frame_and_when_the_writer_dies_within_one
     let folder = kitti("dies");
     fs::remove_file(folder.join("image_0/000002.png")).unwrap();
     let (good, bad) = errors(&folder);
-    assert_eq!((good, bad.len()), (vec![0, 1], 1));
+    assert_eq!((good, bad), (vec![0, 1], vec![]));
+    let warnings = folder.open().unwrap().warnings;
+    assert!(matches!(warnings[..], [RecordingWarning::Unfinished { frame: 2, .. }]), "{warnings:?}");
     fs::remove_file(folder.join("image_1/000002.png")).unwrap();
     fs::write(folder.join("image_1/000002.part"), b"half").unwrap();
     let (good, bad) = errors(&folder);
@@ -124,4 +126,74 @@ fn what_cannot_be_written_is_said_and_what_was_written_stays() {
     let chosen = StereoCalibration::Raw(RawPair { rectification: Some(chosen), ..raw() });
     let error = RecordingWriter::create(Folder::new("unwritable-4").0.clone(), &chosen, &MOUNT).unwrap_err();
     assert!(matches!(error, RecordingError::Unwritable { .. }), "{error}");
+}
+
+#[test]
+fn a_list_that_is_torn_off_anywhere_in_its_last_line_is_read_up_to_there() {
+    for (name, make) in
+        [("times.txt", kitti as fn(&str) -> Folder), ("mav0/cam0/data.csv", euroc), ("mav0/cam1/data.csv", euroc)]
+    {
+        let folder = make("torn");
+        let whole = fs::read_to_string(folder.join(name)).unwrap();
+        let last = whole.trim_end().rfind('\n').unwrap() + 1;
+        let all = play(&mut folder.camera());
+        for length in last..whole.len() {
+            folder.write(name, &whole[..length]);
+            let recording = folder.open().unwrap_or_else(|error| panic!("{name}, {length} bytes: {error}"));
+            let warnings = recording.warnings.clone();
+            let frames = play(&mut recording.into_camera());
+            assert!(frames.iter().all(Result::is_ok), "{name}, {length} bytes: {frames:?}");
+            if name != "times.txt" {
+                // The last two frames share nothing with a line that is torn.
+                assert!(frames[..2] == all[..2] && (frames.len() == 2 || length + 1 == whole.len()), "{length} bytes");
+            }
+            let torn = warnings.iter().any(
+                |warning| matches!(warning, RecordingWarning::TornLine { line, .. } if *line == whole.lines().count()),
+            );
+            let unpaired = warnings.iter().any(|warning| {
+                matches!(
+                    warning,
+                    RecordingWarning::Unpaired { .. }
+                        | RecordingWarning::TimesTooFew { .. }
+                        | RecordingWarning::TimeDoesNotRise { .. }
+                )
+            });
+            assert!(
+                torn || unpaired || length + 1 == whole.len() || name == "times.txt",
+                "{name}, {length} bytes: {warnings:?}"
+            );
+        }
+    }
+    // A line that is wrong elsewhere is no torn one.
+    let folder = euroc("torn-inside");
+    let whole = fs::read_to_string(folder.join("mav0/cam0/data.csv")).unwrap();
+    folder.write("mav0/cam0/data.csv", &whole.replacen(",", ";", 2));
+    assert!(matches!(folder.open(), Err(RecordingError::Line { .. })));
+}
+
+#[test]
+fn a_calibration_is_recorded_as_the_files_that_it_was_read_from() {
+    let calibrations = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/calibration");
+    for (name, files) in [("whole.yml", vec!["whole.yml"]), ("whole.xml", vec!["whole.xml"])] {
+        let files: Vec<_> = files.iter().map(|file| calibrations.join(file)).collect();
+        let calibration = Calibration::load(&files, None).unwrap();
+        let StereoCalibration::Raw(pair) = calibration.stereo else { panic!("{name} is raw") };
+        assert!(pair.rectification.is_some(), "{name} brings a rectification");
+        let folder = Folder::new("with-files");
+        let writer = RecordingWriter::create_with_files(&folder.0, &calibration.stereo, &MOUNT, &files);
+        let mut writer = writer.unwrap();
+        let (width, height) = (pair.left.width as usize, pair.left.height as usize);
+        let pixels = vec![100; width * height];
+        let grey = Picture::packed(&pixels, width, height).unwrap();
+        let lent = StereoPair { left: grey, right: grey, timestamp_ns: 5, skew_ns: 0, sequence: 0, missed: 0 };
+        writer.write_pair(&lent).unwrap();
+        let again = folder.open().unwrap();
+        assert_eq!((again.layout, again.calibration.stereo), (Layout::Euroc, calibration.stereo), "to the last bit");
+        let without = RecordingWriter::create(folder.join("again"), &calibration.stereo, &MOUNT).unwrap_err();
+        assert!(without.to_string().contains("give the files"), "{without}");
+    }
+    let folder = Folder::new("with-missing-files");
+    let gone = [folder.join("gone.yaml")];
+    let error = RecordingWriter::create_with_files(folder.join("r"), &StereoCalibration::Raw(raw()), &MOUNT, &gone);
+    assert!(matches!(error, Err(RecordingError::Io { .. })));
 }

@@ -3,32 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde::Serialize;
 use v4l2r::ioctl::{self, Capability};
 
 use super::device;
-use super::offers::{self, OfferedControl, OfferedFormat};
-
-/// A device that takes pictures, and what it offers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ListedDevice {
-    /// The device.
-    pub device: PathBuf,
-    /// Names that stay the same over a restart and another socket, as far as the system gives them.
-    pub names: Vec<PathBuf>,
-    /// What it is.
-    pub card: String,
-    /// Its driver.
-    pub driver: String,
-    /// Where it is plugged in.
-    pub bus: String,
-    /// Formats, sizes, rates.
-    pub formats: Vec<OfferedFormat>,
-    /// Controls of exposure and gain.
-    pub controls: Vec<OfferedControl>,
-    /// Why nothing more is known, where it cannot be opened.
-    pub problem: Option<String>,
-}
+use super::offers;
+use crate::camera::ListedDevice;
 
 /// The devices of this machine that take pictures, in the order of their numbers, and those that cannot be opened.
 pub fn list() -> Vec<ListedDevice> {

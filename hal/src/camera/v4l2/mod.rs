@@ -17,8 +17,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 pub use error::{V4l2Error, V4l2Problem};
-pub use list::{ListedDevice, list};
-pub use offers::{OfferedControl, OfferedFormat, OfferedSize};
+pub use list::list;
 
 use super::pairing::{Paired, Pairing, PairingCounts, Side};
 use super::pixels::{self, Unpacker};

@@ -2,7 +2,6 @@
 
 use std::fs::File;
 
-use serde::Serialize;
 use v4l2r::bindings::{v4l2_frmivalenum, v4l2_frmsizeenum, v4l2_queryctrl};
 use v4l2r::ioctl::{
     self, Capabilities, Capability, CtrlId, FormatIterator, FrmIvalTypes, FrmSizeTypes, QueryCtrlFlags,
@@ -10,53 +9,10 @@ use v4l2r::ioctl::{
 use v4l2r::nix::errno::Errno;
 use v4l2r::{PixelFormat as FourCc, QueueType};
 
-use crate::camera::PixelFormat;
+use crate::camera::{OfferedControl, OfferedFormat, OfferedSize, PixelFormat};
 
 /// More of anything than this is not a list that ends.
 const MOST: u32 = 256;
-
-/// A format that a device offers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfferedFormat {
-    /// Its four characters, without blanks at the end.
-    pub fourcc: String,
-    /// The driver's name for it.
-    pub description: String,
-    /// The format, where it is one that pictures are taken from.
-    pub format: Option<PixelFormat>,
-    /// Sizes of pictures.
-    pub sizes: Vec<OfferedSize>,
-}
-
-/// A size of pictures, or a range of them where largest and smallest differ.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfferedSize {
-    /// Smallest width and height, px.
-    pub min: (u32, u32),
-    /// Largest width and height, px.
-    pub max: (u32, u32),
-    /// Step of width and height, px.
-    pub step: (u32, u32),
-    /// Pictures per second at this size (at the largest one of a range), slowest and fastest of a range.
-    pub rates_hz: Vec<f32>,
-}
-
-/// A control that a device has.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct OfferedControl {
-    /// The driver's name for it.
-    pub name: String,
-    /// Identifier.
-    pub id: u32,
-    /// Smallest value.
-    pub min: i32,
-    /// Largest value.
-    pub max: i32,
-    /// Value at the start.
-    pub default: i32,
-    /// Value now, where it can be read.
-    pub value: Option<i32>,
-}
 
 /// Controls of exposure and gain, as the kernel numbers them (`v4l2-controls.h`).
 pub(super) mod id {
@@ -90,7 +46,7 @@ pub(super) fn formats(file: &File, queue: QueueType) -> Vec<OfferedFormat> {
     let format = |description: ioctl::FmtDesc| {
         let fourcc: [u8; 4] = description.pixelformat.into();
         OfferedFormat {
-            fourcc: String::from_utf8_lossy(&fourcc).trim_end().to_owned(),
+            fourcc: name(fourcc),
             description: description.description,
             format: PixelFormat::from_fourcc(fourcc),
             sizes: sizes(file, description.pixelformat),
@@ -99,16 +55,11 @@ pub(super) fn formats(file: &File, queue: QueueType) -> Vec<OfferedFormat> {
     descriptions.map(format).collect()
 }
 
-/// The formats in one line.
-pub(super) fn in_words(formats: &[OfferedFormat]) -> String {
-    if formats.is_empty() {
-        return "nothing".to_owned();
-    }
-    let sizes = |format: &OfferedFormat| {
-        let sizes: Vec<String> = format.sizes.iter().map(ToString::to_string).collect();
-        format!("{} {}", format.fourcc, sizes.join(", "))
-    };
-    formats.iter().map(sizes).collect::<Vec<_>>().join("; ")
+/// The four characters as text. A format with its bytes the other way round has the highest bit set.
+fn name([a, b, c, d]: [u8; 4]) -> String {
+    let characters = [a, b, c, d & 0x7F];
+    let order = if d & 0x80 == 0 { "" } else { "-BE" };
+    format!("{}{order}", String::from_utf8_lossy(&characters).trim_end())
 }
 
 /// Every rate of pictures of one size.
@@ -178,49 +129,4 @@ fn sizes(file: &File, format: FourCc) -> Vec<OfferedSize> {
         }
     }
     sizes
-}
-
-impl OfferedSize {
-    /// Whether pictures of this size are within it.
-    pub const fn holds(&self, width: u32, height: u32) -> bool {
-        let (min, max, step) = (self.min, self.max, self.step);
-        width >= min.0
-            && width <= max.0
-            && height >= min.1
-            && height <= max.1
-            && (width - min.0).is_multiple_of(step.0)
-            && (height - min.1).is_multiple_of(step.1)
-    }
-}
-
-impl core::fmt::Display for OfferedSize {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} x {}", self.min.0, self.min.1)?;
-        if self.min != self.max {
-            write!(f, " to {} x {}", self.max.0, self.max.1)?;
-        }
-        Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_in_words_and_what_they_hold() {
-        let fixed = OfferedSize { min: (640, 480), max: (640, 480), step: (1, 1), rates_hz: vec![30.0] };
-        let range = OfferedSize { min: (2, 1), max: (1920, 1080), step: (2, 1), rates_hz: vec![] };
-        assert!(fixed.holds(640, 480) && !fixed.holds(320, 240));
-        assert!(range.holds(512, 384) && !range.holds(513, 384) && !range.holds(1922, 10));
-        let format = |fourcc: &str, sizes| OfferedFormat {
-            fourcc: fourcc.to_owned(),
-            description: String::new(),
-            format: None,
-            sizes,
-        };
-        let words = in_words(&[format("GREY", vec![fixed.clone(), fixed]), format("YUYV", vec![range])]);
-        assert_eq!(words, "GREY 640 x 480, 640 x 480; YUYV 2 x 1 to 1920 x 1080");
-        assert_eq!(in_words(&[]), "nothing");
-    }
 }

@@ -10,7 +10,7 @@ use v4l2r::{Format, PixelFormat as FourCc, QueueType, ioctl};
 use super::device::{Pictures, os};
 use super::error::{V4l2Error, V4l2Problem};
 use super::offers::{self, id};
-use crate::camera::{CameraSettings, PixelFormat};
+use crate::camera::{CameraSettings, PixelFormat, formats_in_words};
 
 /// `V4L2_EXPOSURE_MANUAL`.
 const EXPOSURE_MANUAL: i32 = 1;
@@ -58,7 +58,7 @@ pub(super) fn set_format(
     }
     let name = settings.format.map_or("any format that can be used", PixelFormat::name);
     let wanted = format!("{name} of {width} x {height} px");
-    Err(V4l2Error::new(path, V4l2Problem::Format { wanted, offers: offers::in_words(&offered) }))
+    Err(V4l2Error::new(path, V4l2Problem::Format { wanted, offers: formats_in_words(&offered) }))
 }
 
 /// Sets the rate to the nearest one that the device offers.
