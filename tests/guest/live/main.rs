@@ -6,6 +6,8 @@ mod buses;
 mod cameras;
 #[cfg(all(feature = "guest", target_os = "linux"))]
 mod machinery;
+#[cfg(all(feature = "guest", target_os = "linux"))]
+mod program;
 
 #[cfg(not(all(feature = "guest", target_os = "linux")))]
 #[test]
