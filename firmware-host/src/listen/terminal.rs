@@ -96,6 +96,7 @@ fn view<'a>(session: &'a Session, name: &'a str, node: Option<NodeId>, palette: 
         echo: session.controller.as_ref().map(super::controller::Controller::counts),
         node,
         since_ns: session.since_ns,
+        open_since_ns: session.open_since_ns,
         now_ns,
         palette,
     }
