@@ -154,7 +154,7 @@ fn title(view: &View<'_>, width: usize) -> Line<'static> {
     }
     left.push(Span::raw(format!("  {frames_per_s:.0} frames/s")));
     let right = match (&view.state, view.log) {
-        (SourceState::Paused, _) => "PAUSED ".to_owned(),
+        (SourceState::Paused, Some((at, all, _))) => format!("HELD at {at:.1} of {all:.1} s "),
         (SourceState::Ended, Some((_, all, _))) => format!("END OF THE LOG {all:.1} s "),
         (_, Some((at, all, speed))) => format!("log {at:.1} of {all:.1} s, x{speed} "),
         _ => format!("{:.0} s ", view.now_ns.saturating_sub(view.since_ns) as f64 * 1.0e-9),
