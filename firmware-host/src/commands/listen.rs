@@ -113,12 +113,12 @@ fn lines<W: Write>(session: &mut Session, mut plain: Plain<W>) -> io::Result<()>
         while let Some((at_ns, frame)) = session.next_frame() {
             quiet = false;
             // What was missing until now is said before what has come.
-            plain.look(&session.listener, &session.source.state(), session.since_ns, at_ns)?;
+            plain.look(&session.listener, &session.source.state(), session.open_since_ns, at_ns)?;
             if let Some((node, event)) = session.take(at_ns, &frame) {
                 plain.event(node, &event, at_ns)?;
             }
         }
-        plain.look(&session.listener, &session.source.state(), session.since_ns, session.source.now_ns())?;
+        plain.look(&session.listener, &session.source.state(), session.open_since_ns, session.source.now_ns())?;
         if session.is_over() {
             return plain.finish(&session.listener, &session.source);
         }

@@ -71,12 +71,19 @@ impl<W: Write> Plain<W> {
         }
     }
 
-    /// Writes what has changed without a frame: the bus fell silent, a node's heartbeat stopped.
+    /// Writes what has changed without a frame: the bus fell silent, a node's heartbeat stopped. `open_since_ns` is since when
+    /// frames could have come.
     ///
     /// # Errors
     /// When the line cannot be written.
-    pub fn look(&mut self, listener: &Listener, state: &SourceState, since_ns: u64, now_ns: u64) -> io::Result<()> {
-        let bus = verdict::of_bus(listener, state, since_ns, now_ns);
+    pub fn look(
+        &mut self,
+        listener: &Listener,
+        state: &SourceState,
+        open_since_ns: u64,
+        now_ns: u64,
+    ) -> io::Result<()> {
+        let bus = verdict::of_bus(listener, state, open_since_ns, now_ns);
         // Its seconds rise: the sentence's beginning tells whether it is a new one.
         let kind = |verdict: &Option<Verdict>| verdict.as_ref().map(|v| v.text.split(':').next().map(str::to_owned));
         if kind(&bus) != kind(&self.bus) {

@@ -29,6 +29,8 @@ pub struct Session {
     pub bitrate: Option<u32>,
     /// When it began, nanoseconds.
     pub since_ns: u64,
+    /// Since when frames could have come: as above, or since the interface came back.
+    pub open_since_ns: u64,
     limits: Limits,
     whom: (BaseId, Option<NodeId>),
 }
@@ -43,6 +45,7 @@ impl Session {
             controller: None,
             bitrate: None,
             since_ns,
+            open_since_ns: since_ns,
             limits,
             whom,
         }
@@ -53,7 +56,14 @@ impl Session {
         if let Some(controller) = &mut self.controller {
             controller.tell_motion(&mut self.source, &mut self.listener);
         }
-        if self.is_over() { None } else { self.source.next_frame() }
+        if self.is_over() {
+            return None;
+        }
+        let frame = self.source.next_frame();
+        if self.source.is_in_trouble() {
+            self.open_since_ns = self.source.now_ns();
+        }
+        frame
     }
 
     /// Takes a frame that came at `at_ns`, and answers it. Gives what it brought, where that is worth a word.
@@ -79,5 +89,6 @@ impl Session {
     pub fn forget(&mut self) {
         self.listener = Listener::new(self.whom.0, self.whom.1);
         self.since_ns = self.source.now_ns();
+        self.open_since_ns = self.since_ns;
     }
 }

@@ -101,6 +101,15 @@ impl Source {
         }
     }
 
+    /// Whether the interface cannot be used now.
+    pub const fn is_in_trouble(&self) -> bool {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Bus(bus) => matches!(bus.state, SourceState::Trouble { .. }),
+            Self::Log(_) => false,
+        }
+    }
+
     /// Bit rate of the interface, bits per second, where it has one.
     pub fn bitrate(&self) -> Option<u32> {
         match self {

@@ -96,6 +96,7 @@ fn view<'a>(session: &'a Session, name: &'a str, node: Option<NodeId>, palette: 
         echo: session.controller.as_ref().map(super::controller::Controller::counts),
         node,
         since_ns: session.since_ns,
+        open_since_ns: session.open_since_ns,
         now_ns,
         palette,
     }
@@ -141,4 +142,62 @@ fn next(listener: &Listener, node: Option<NodeId>, steps: isize) -> Option<NodeI
     let count = isize::try_from(nodes.len()).ok().filter(|count| *count > 0)?;
     let place = nodes.iter().position(|id| Some(*id) == node).unwrap_or(0);
     nodes.get((place as isize + steps).rem_euclid(count) as usize).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::listen::{
+        session::Limits,
+        source::{LogSource, Source, SourceState},
+        testing::{Speaker, node},
+    };
+    use fencepost_core::wire::BaseId;
+
+    #[test]
+    fn keys_do_what_the_last_line_says() {
+        let press = |code| wish(KeyEvent::new(code, KeyModifiers::NONE));
+        for code in [KeyCode::Char('q'), KeyCode::Esc] {
+            assert_eq!(press(code), Wish::Quit);
+        }
+        assert_eq!(wish(KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL)), Wish::Quit);
+        assert_eq!((press(KeyCode::Tab), press(KeyCode::BackTab)), (Wish::Next(1), Wish::Next(-1)));
+        assert_eq!((press(KeyCode::Char('c')), press(KeyCode::Enter)), (Wish::Nothing, Wish::Nothing));
+        assert_eq!(press(KeyCode::Char('+')), Wish::Faster(2.0));
+    }
+
+    #[test]
+    fn nodes_are_gone_through_around_and_around() {
+        let mut listener = Listener::new(BaseId::DEFAULT, None);
+        assert_eq!(next(&listener, None, 1), None);
+        for number in [1, 5, 9] {
+            listener.take(&Speaker::new(number).heartbeat()[0], 0);
+        }
+        let seen: Vec<u8> = std::iter::successors(next(&listener, None, 1), |node| next(&listener, Some(*node), 1))
+            .map(NodeId::get)
+            .take(4)
+            .collect();
+        assert_eq!(seen, [5, 9, 1, 5], "the first is shown to begin with");
+        assert_eq!(next(&listener, Some(node(1)), -1), Some(node(9)));
+    }
+
+    #[test]
+    fn a_log_that_is_played_again_is_heard_anew() {
+        let mut speaker = Speaker::new(0);
+        let frames: Vec<_> = speaker.heartbeat().into_iter().chain(speaker.scan()).collect();
+        let log: String = frames.iter().map(|frame| format!("(5.000000) can0 {frame}\n")).collect();
+        let source = Source::Log(LogSource::new(log.as_bytes(), None, 1.0));
+        let mut session = Session::new(source, (BaseId::DEFAULT, None), Limits::default());
+        for _ in 0..2 {
+            while let Some((at_ns, frame)) = session.next_frame() {
+                session.take(at_ns, &frame);
+            }
+            assert_eq!((session.listener.scans(), session.source.state()), (1, SourceState::Ended));
+            assert!(!session.is_over(), "the last picture stays until the user has seen it");
+            play(&mut session, Wish::Again);
+            assert_eq!(session.listener.scans(), 0);
+        }
+        play(&mut session, Wish::Faster(1e9));
+        assert_eq!(session.source.as_log().unwrap().speed(), 64.0);
+    }
 }

@@ -45,8 +45,8 @@ impl Verdict {
     }
 }
 
-/// What is wrong with the bus as a whole; `None` if nothing is. `heard_since_ns` is when listening began.
-pub fn of_bus(listener: &Listener, state: &SourceState, heard_since_ns: u64, now_ns: u64) -> Option<Verdict> {
+/// What is wrong with the bus as a whole; `None` if nothing is. `open_since_ns` is since when frames could have come.
+pub fn of_bus(listener: &Listener, state: &SourceState, open_since_ns: u64, now_ns: u64) -> Option<Verdict> {
     if let SourceState::Trouble { what, mend } = state {
         return Some(Verdict::new(Severity::Bad, what.as_str()).hint(mend.as_str()));
     }
@@ -54,14 +54,14 @@ pub fn of_bus(listener: &Listener, state: &SourceState, heard_since_ns: u64, now
         return Some(Verdict::new(Severity::Bad, "the log holds no frame"));
     }
     let traffic = listener.traffic();
-    let silent_ns = now_ns.saturating_sub(traffic.newest_ns().unwrap_or(heard_since_ns));
+    let silent_ns = now_ns.saturating_sub(traffic.newest_ns().unwrap_or(0).max(open_since_ns));
     if silent_ns >= SILENCE_NS {
         let seconds = silent_ns / 1_000_000_000;
         return Some(Verdict::new(Severity::Bad, format!("NOTHING COMES: no frame on the bus for {seconds} s")).hint(
             "Does the node run? Same bit rate at both ends? CAN_H and CAN_L not exchanged, 120 ohms at both ends?",
         ));
     }
-    if listener.nodes().is_empty() && traffic.frames() > 0 && now_ns.saturating_sub(heard_since_ns) >= SILENCE_NS {
+    if listener.nodes().is_empty() && traffic.frames() > 0 && now_ns.saturating_sub(open_since_ns) >= SILENCE_NS {
         let base = listener.base().get();
         return Some(
             Verdict::new(
@@ -190,6 +190,7 @@ mod tests {
         let second = 1_000_000_000;
         assert_eq!(of_bus(&listener, &SourceState::Open, 0, second / 2), None);
         assert!(of_bus(&listener, &SourceState::Open, 0, 3 * second).unwrap().text.contains("for 3 s"));
+        assert_eq!(of_bus(&listener, &SourceState::Open, 5 * second / 2, 3 * second), None, "it was down until now");
         listener.take(&"123#01".parse().unwrap(), 2 * second);
         assert!(of_bus(&listener, &SourceState::Open, 0, 2 * second).unwrap().text.starts_with("NO NODE: 1 frames"));
         let down = SourceState::Trouble { what: "can0 is down".into(), mend: "ip link set can0 up".into() };

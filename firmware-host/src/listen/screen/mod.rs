@@ -59,9 +59,11 @@ pub struct View<'a> {
     pub echo: Option<(u64, u64)>,
     /// The node that is looked at.
     pub node: Option<NodeId>,
-    /// When listening began, and now, nanoseconds.
+    /// When listening began, nanoseconds.
     pub since_ns: u64,
-    /// See above.
+    /// Since when frames could have come, nanoseconds.
+    pub open_since_ns: u64,
+    /// Now, nanoseconds.
     pub now_ns: u64,
     /// Colours.
     pub palette: Palette,
@@ -91,7 +93,7 @@ pub fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
     ]);
     let [title_area, tabs_area, verdict_area, main, sectors_area, keys_area] = rows.areas(area);
     let node = view.selected();
-    let of_bus = verdict::of_bus(view.listener, &view.state, view.since_ns, view.now_ns);
+    let of_bus = verdict::of_bus(view.listener, &view.state, view.open_since_ns, view.now_ns);
     let of_node = node.map(|node| verdict::of_node(node, view.now_ns));
 
     frame.render_widget(title(view, usize::from(title_area.width)), title_area);
@@ -152,7 +154,7 @@ fn title(view: &View<'_>, width: usize) -> Line<'static> {
     }
     left.push(Span::raw(format!("  {frames_per_s:.0} frames/s")));
     let right = match (&view.state, view.log) {
-        (SourceState::Paused, _) => "PAUSED ".to_owned(),
+        (SourceState::Paused, Some((at, all, _))) => format!("HELD at {at:.1} of {all:.1} s "),
         (SourceState::Ended, Some((_, all, _))) => format!("END OF THE LOG {all:.1} s "),
         (_, Some((at, all, speed))) => format!("log {at:.1} of {all:.1} s, x{speed} "),
         _ => format!("{:.0} s ", view.now_ns.saturating_sub(view.since_ns) as f64 * 1.0e-9),

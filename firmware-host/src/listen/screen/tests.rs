@@ -41,6 +41,7 @@ fn view(listener: &Listener, now_ms: u64) -> View<'_> {
         echo: None,
         node: None,
         since_ns: 0,
+        open_since_ns: 0,
         now_ns: now_ms * 1_000_000,
         palette: Palette { colours: true },
     }
