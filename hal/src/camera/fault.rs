@@ -163,7 +163,7 @@ impl<C> FaultyCamera<C> {
         self.faults.frozen = sides;
     }
 
-    /// These cameras are underexposed: an eighth of every grey value.
+    /// These cameras are underexposed: a thirty-second part of every grey value.
     pub const fn set_dark(&mut self, sides: Sides) {
         self.faults.dark = sides;
     }
@@ -319,7 +319,7 @@ impl Faults {
             }
             for row in picture.chunks_exact_mut(width) {
                 if dark {
-                    row.iter_mut().for_each(|pixel| *pixel /= 8);
+                    row.iter_mut().for_each(|pixel| *pixel /= 32);
                 }
                 if saturated {
                     row.iter_mut().for_each(|pixel| *pixel = pixel.saturating_mul(8).saturating_add(160));

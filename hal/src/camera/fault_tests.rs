@@ -160,7 +160,7 @@ fn light_and_cover_change_the_sides_that_were_set_and_no_other() {
     type Set = fn(&mut FaultyCamera<Plain>, Sides);
     type Holds = fn(usize, u8, u8) -> bool;
     let faults: [(Set, Holds); 4] = [
-        (|camera, sides| camera.set_dark(sides), |_, seen, truth| seen == truth / 8),
+        (|camera, sides| camera.set_dark(sides), |_, seen, truth| seen == truth / 32),
         (|camera, sides| camera.set_saturated(sides), |_, seen, _| seen == 255),
         (|camera, sides| camera.set_covered(sides, 100), |_, seen, _| (COVERED_GREY..COVERED_GREY + 4).contains(&seen)),
         (

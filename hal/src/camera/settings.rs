@@ -38,9 +38,10 @@ pub struct CameraSettings {
     /// Largest difference between the exposures of a left and a right picture that are a pair, milliseconds.
     #[serde(default = "default_pairing_tolerance_ms")]
     pub pairing_tolerance_ms: f32,
-    /// Longest wait for a pair before it is missing, milliseconds.
-    #[serde(default = "default_timeout_ms")]
-    pub timeout_ms: u32,
+    /// Longest wait for a pair before it is missing, milliseconds; see [`CameraSettings::timeout_ms`] for what holds if left
+    /// out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timeout_ms: Option<u32>,
     /// Takes the newest pair and passes over older ones that wait, so that the pictures are never older than need be; with
     /// `false` every pair is taken.
     #[serde(default = "default_newest_only")]
@@ -145,6 +146,15 @@ impl CameraSettings {
         (f64::from(self.pairing_tolerance_ms) * 1.0e6).round() as u64
     }
 
+    /// Longest wait for a pair, milliseconds: as set, or else a little less than the time of two pictures, so that within two
+    /// pictures it is known that one is missing; but not less than 90 ms, where the bus has 100 ms to say so.
+    pub fn timeout_ms(&self) -> u32 {
+        const LEAST_MS: f32 = 90.0;
+        const PERIODS_MS: f32 = 1800.0;
+        let of_rate = || (PERIODS_MS / self.rate_hz.unwrap_or(f32::INFINITY)).max(LEAST_MS).round() as u32;
+        self.timeout_ms.unwrap_or_else(of_rate)
+    }
+
     /// Every setting that cannot be used.
     pub fn mistakes(&self) -> Vec<CameraSettingsError> {
         let mut mistakes: Vec<_> = self.devices().err().into_iter().collect();
@@ -162,7 +172,7 @@ impl CameraSettings {
         // With one buffer held and one being filled none is left for the picture in between.
         range("buffers", Some(self.buffers.into()), 3.0, 32.0, "");
         range("pairing_tolerance_ms", Some(self.pairing_tolerance_ms.into()), 0.0, 1000.0, " ms");
-        range("timeout_ms", Some(self.timeout_ms.into()), 1.0, 60_000.0, " ms");
+        range("timeout_ms", self.timeout_ms.map(f64::from), 1.0, 60_000.0, " ms");
         range("exposure_us", self.exposure_us.map(f64::from), 1.0, 10.0e6, " us");
         if self.format.is_some_and(PixelFormat::is_subsampled) && !self.width.is_multiple_of(2) {
             let problem = format!("is {} px; this format has an even number of pixels in a row", self.width);
@@ -191,7 +201,7 @@ impl CameraSettings {
             rate_hz: None,
             buffers: default_buffers(),
             pairing_tolerance_ms: default_pairing_tolerance_ms(),
-            timeout_ms: default_timeout_ms(),
+            timeout_ms: None,
             newest_only: default_newest_only(),
             exposure_us: None,
             gain: None,
@@ -206,10 +216,6 @@ const fn default_buffers() -> u32 {
 /// A robot at 2 m/s moves 1 cm in it.
 const fn default_pairing_tolerance_ms() -> f32 {
     5.0
-}
-
-const fn default_timeout_ms() -> u32 {
-    100
 }
 
 const fn default_newest_only() -> bool {
@@ -238,7 +244,9 @@ mod tests {
     fn two_devices_and_one() {
         let two = read(r#"{"left": "/dev/video0", "right": "/dev/video2", "width": 640, "height": 480}"#).unwrap();
         assert_eq!(two, CameraSettings::two("/dev/video0", "/dev/video2", 640, 480));
-        assert_eq!((two.buffers, two.pairing_tolerance_ns(), two.timeout_ms), (4, 5_000_000, 100));
+        assert_eq!((two.buffers, two.pairing_tolerance_ns(), two.timeout_ms()), (4, 5_000_000, 90));
+        let at = |rate_hz| CameraSettings { rate_hz: Some(rate_hz), ..two.clone() }.timeout_ms();
+        assert_eq!([10.0, 15.0, 20.0, 60.0].map(at), [180, 120, 90, 90]);
         assert_eq!(two.device_size(), (640, 480));
         let one = read(r#"{"device": "/dev/stereo", "layout": "side-by-side", "width": 640, "height": 480}"#).unwrap();
         assert_eq!(

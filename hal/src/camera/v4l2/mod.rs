@@ -167,7 +167,7 @@ impl V4l2Camera {
     /// # Bound
     /// Until `deadline_ns`, and no more pictures than the devices deliver until then.
     fn wait_for_pair(&mut self, deadline_ns: u64) -> Result<Paired<Frame>, V4l2Error> {
-        let timeout_ms = self.settings.timeout_ms;
+        let timeout_ms = self.settings.timeout_ms();
         let mut came = [false; 2];
         loop {
             let Some(open) = &mut self.open else {
@@ -232,7 +232,7 @@ impl Camera for V4l2Camera {
     type Error = V4l2Error;
 
     fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, Self::Error> {
-        let deadline_ns = monotonic_ns().saturating_add(1_000_000 * u64::from(self.settings.timeout_ms));
+        let deadline_ns = monotonic_ns().saturating_add(1_000_000 * u64::from(self.settings.timeout_ms()));
         self.ready(deadline_ns)?;
         let result = self.wait_for_pair(deadline_ns).and_then(|pair| {
             let not_back = || V4l2Error::new(&self.left, V4l2Problem::NotBack);
@@ -424,7 +424,7 @@ mod tests {
     #[test]
     fn a_device_that_is_not_there_is_tried_again_and_never_waited_for_longer_than_the_time_out() {
         let settings =
-            CameraSettings { timeout_ms: 20, ..CameraSettings::two("/nowhere/left", "/nowhere/right", 640, 480) };
+            CameraSettings { timeout_ms: Some(20), ..CameraSettings::two("/nowhere/left", "/nowhere/right", 640, 480) };
         assert_eq!(V4l2Camera::open(&settings).unwrap_err().kind(), CameraErrorKind::Lost);
         let mut camera = V4l2Camera::closed(&settings).unwrap();
         let mut tried = 0;

@@ -170,7 +170,7 @@ fn a_camera_whose_pictures_cease_is_waited_for_no_longer_than_asked() {
     let mut writers = open();
     show(&mut writers);
     let settings = CameraSettings {
-        timeout_ms: 300,
+        timeout_ms: Some(300),
         pairing_tolerance_ms: 100.0,
         ..CameraSettings::two(loopback::LEFT, loopback::RIGHT, 64, 48)
     };

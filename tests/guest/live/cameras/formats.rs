@@ -57,7 +57,7 @@ fn one_device_delivers_both_pictures() {
     let _cameras = vivid::Cameras::load();
     show_ramp();
     for layout in [PackedLayout::SideBySide, PackedLayout::TopBottom] {
-        let settings = CameraSettings { timeout_ms: 500, ..CameraSettings::one(vivid::LEFT, layout, WIDTH, HEIGHT) };
+        let settings = CameraSettings { timeout_ms: Some(500), ..CameraSettings::one(vivid::LEFT, layout, WIDTH, HEIGHT) };
         let (width, height) = settings.device_size();
         let whole = Reader::open(vivid::LEFT, *b"GREY", width, height).read();
         let mut camera = V4l2Camera::open(&CameraSettings { format: Some(PixelFormat::Grey), ..settings }).unwrap();
@@ -83,7 +83,7 @@ fn jpeg_pictures_become_grey() {
     writers.iter_mut().for_each(|writer| writer.write(&jpeg));
     let settings = CameraSettings {
         format: Some(PixelFormat::Mjpg),
-        timeout_ms: 1000,
+        timeout_ms: Some(1000),
         pairing_tolerance_ms: 50.0,
         ..CameraSettings::two(loopback::LEFT, loopback::RIGHT, WIDTH, HEIGHT)
     };

@@ -15,7 +15,7 @@ const HEIGHT: u32 = 384;
 fn virtual_pair() -> CameraSettings {
     CameraSettings {
         pairing_tolerance_ms: 9.0,
-        timeout_ms: 500,
+        timeout_ms: Some(500),
         ..CameraSettings::two(vivid::LEFT, vivid::RIGHT, WIDTH, HEIGHT)
     }
 }
