@@ -131,3 +131,7 @@ impl<const WIDTH: usize> Content<WIDTH> {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "content_tests.rs"]
+mod tests;
