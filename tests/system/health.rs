@@ -233,9 +233,8 @@ fn undisturbed_recordings_give_no_reason_to_doubt_the_cameras() {
             worst(&|s| s.signs.rows.error_px),
             worst(&|s| s.signs.rows.near_percent)
         );
-        alarms.extend(seen.iter().enumerate().filter_map(|(frame, seen)| {
-            NEVER.iter().any(|reason| seen.health.has(*reason)).then(|| format!("{name} {frame}: {seen}"))
-        }));
+        let doubts = seen.iter().enumerate().filter(|(_, seen)| NEVER.iter().any(|reason| seen.health.has(*reason)));
+        alarms.extend(doubts.map(|(frame, seen)| format!("{name} {frame}: {seen}")));
     }
     assert_eq!(alarms, [""; 0]);
 }

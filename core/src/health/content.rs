@@ -104,7 +104,7 @@ impl<const WIDTH: usize> Content<WIDTH> {
                 return;
             }
             // Near the upper and lower edge there are not enough rows, and there never will be.
-            if y >= MARGIN + 1 && y + MARGIN + 1 < self.height {
+            if y > MARGIN && y + MARGIN + 1 < self.height {
                 if !matcher.has_filtered(y + MARGIN) {
                     return;
                 }
@@ -131,3 +131,7 @@ impl<const WIDTH: usize> Content<WIDTH> {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "content_tests.rs"]
+mod tests;

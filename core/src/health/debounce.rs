@@ -96,3 +96,7 @@ impl Debounce {
         self.told.health()
     }
 }
+
+#[cfg(test)]
+#[path = "debounce_tests.rs"]
+mod tests;

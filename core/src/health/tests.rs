@@ -96,6 +96,48 @@ fn what_is_too_near_is_said_to_block_the_view() {
 }
 
 #[test]
+fn a_frozen_picture_frees_nothing_and_is_forgiven() {
+    let mut random = Random::seeded("sensor noise", 0x5eed_0072);
+    let wall = wall(10, |grey| grey);
+    let mut noisy = |picture: &[u8]| -> Vec<u8> { picture.iter().map(|grey| grey + random.below(3) as u8).collect() };
+    let mut detector = detector();
+    let mut look = |left: &[u8], right: &[u8]| {
+        let view = |picture| Picture::packed(picture, WIDTH, HEIGHT).unwrap();
+        let detection = detector.detect(&view(left), &view(right), &mut ()).unwrap();
+        (detection.health.has(HealthReason::FrozenPicture), detection.health.level)
+    };
+    let first = noisy(&wall.0);
+    assert!(!look(&first, &noisy(&wall.1)).0);
+    // The same thing before the camera is not the same picture.
+    assert!(!look(&noisy(&wall.0), &noisy(&wall.1)).0);
+    let last = noisy(&wall.0);
+    assert!(!look(&last, &noisy(&wall.1)).0);
+    assert_eq!(look(&last, &noisy(&wall.1)), (true, HealthLevel::Blind));
+    let told = (0..6).map(|_| look(&noisy(&wall.0), &noisy(&wall.1)).0).collect::<Vec<_>>();
+    assert_eq!(told, [true, true, true, true, false, false], "five frames without it");
+}
+
+#[test]
+fn settings_that_cannot_be_are_named() {
+    let good = HealthSettings::default();
+    assert_eq!(good.check(), Ok(()));
+    let field = |settings: HealthSettings| settings.check().unwrap_err().field;
+    assert_eq!(field(HealthSettings { dark_blind_percent: f32::NAN, ..good }), "health.dark_blind_percent");
+    assert_eq!(field(HealthSettings { bright_blind_percent: 102.0, ..good }), "health.bright_blind_percent");
+    assert_eq!(field(HealthSettings { structure_grey: 0.0, ..good }), "health.structure_grey");
+    assert_eq!(field(HealthSettings { covered_percent: 0.0, ..good }), "health.covered_percent");
+    assert_eq!(field(HealthSettings { covered_blind_percent: 0.0, ..good }), "health.covered_blind_percent");
+    assert_eq!(field(HealthSettings { flat_percent: -1.0, ..good }), "health.flat_percent");
+    assert_eq!(field(HealthSettings { flat_excess_percent: 0.0, ..good }), "health.flat_excess_percent");
+    assert_eq!(field(HealthSettings { pairing_sigmas: 0.5, ..good }), "health.pairing_sigmas");
+    assert_eq!(field(HealthSettings { pairing_likeness: 1.5, ..good }), "health.pairing_likeness");
+    assert_eq!(field(HealthSettings { row_error_px: 0.0, ..good }), "health.row_error_px");
+    assert_eq!(field(HealthSettings { row_error_blind_px: f32::INFINITY, ..good }), "health.row_error_blind_px");
+    assert_eq!(field(HealthSettings { trigger_frames: 3, ..good }), "health.trigger_frames");
+    assert_eq!(field(HealthSettings { release_frames: 0, ..good }), "health.release_frames");
+}
+
+#[test]
 fn every_reason_has_a_bit_and_a_name_of_its_own() {
     for (bit, reason) in HealthReason::ALL.iter().enumerate() {
         assert_eq!(*reason as usize, bit);
