@@ -16,9 +16,9 @@ use crate::{
     listen::{
         controller::Controller,
         plain::Plain,
-        session::{Limits, Session},
         source::{LogSource, Source},
         terminal,
+        watch::{Limits, Watch},
     },
 };
 
@@ -31,15 +31,15 @@ const WAIT: Duration = Duration::from_millis(5);
 /// When the log cannot be read or the terminal not be used. A bus that is down or gone is waited for.
 pub fn listen(args: &ListenArgs, console: &Console) -> Result<Ending, Failure> {
     let live = !args.plain && !args.json && io::stdout().is_terminal();
-    let mut session = session(args, live)?;
+    let mut watch = watch(args, live)?;
     let name = match (&args.log, &args.interface) {
         (Some(log), _) => log.file_name().unwrap_or(log.as_os_str()).to_string_lossy().into_owned(),
         (None, interface) => interface.clone().unwrap_or_default(),
     };
     let result = if live {
-        terminal::run(&mut session, &name)
+        terminal::run(&mut watch, &name)
     } else {
-        lines(&mut session, Plain::new(BufWriter::new(io::stdout().lock()), args.json))
+        lines(&mut watch, Plain::new(BufWriter::new(io::stdout().lock()), args.json))
     };
     match result {
         Ok(()) => {}
@@ -50,8 +50,8 @@ pub fn listen(args: &ListenArgs, console: &Console) -> Result<Ending, Failure> {
         }
         Err(error) => return Err(Failure::work(format!("the lines cannot be written: {error}"))),
     }
-    if !live && session.listener.nodes().is_empty() {
-        let frames = session.listener.traffic().frames();
+    if !live && watch.listener.nodes().is_empty() {
+        let frames = watch.listener.traffic().frames();
         console.error(
             Failure::work(format!("no message of fencepost in {frames} frames"))
                 .at(name)
@@ -62,7 +62,7 @@ pub fn listen(args: &ListenArgs, console: &Console) -> Result<Ending, Failure> {
     Ok(Ending::Good)
 }
 
-fn session(args: &ListenArgs, live: bool) -> Result<Session, Failure> {
+fn watch(args: &ListenArgs, live: bool) -> Result<Watch, Failure> {
     let usage = |error: &dyn std::fmt::Display, option: &str, mend: &str| {
         Failure::usage(error.to_string()).at(option).mend(mend)
     };
@@ -81,10 +81,10 @@ fn session(args: &ListenArgs, live: bool) -> Result<Session, Failure> {
         None => open(args.interface.as_deref().unwrap_or_default())?,
     };
     let limits = Limits { scans: args.count, seconds: args.seconds, end_of_log: !live };
-    let mut session = Session::new(source, (base, node), limits);
-    session.bitrate = args.bitrate;
-    session.controller = args.echo.then(|| Controller::new(motion(args)));
-    Ok(session)
+    let mut watch = Watch::new(source, (base, node), limits);
+    watch.bitrate = args.bitrate;
+    watch.controller = args.echo.then(|| Controller::new(motion(args)));
+    Ok(watch)
 }
 
 #[cfg(target_os = "linux")]
@@ -107,20 +107,20 @@ fn motion(args: &ListenArgs) -> VehicleMotionRepr {
     }
 }
 
-fn lines<W: Write>(session: &mut Session, mut plain: Plain<W>) -> io::Result<()> {
+fn lines<W: Write>(watch: &mut Watch, mut plain: Plain<W>) -> io::Result<()> {
     loop {
         let mut quiet = true;
-        while let Some((at_ns, frame)) = session.next_frame() {
+        while let Some((at_ns, frame)) = watch.next_frame() {
             quiet = false;
             // What was missing until now is said before what has come.
-            plain.look(&session.listener, &session.source.state(), session.open_since_ns, at_ns)?;
-            if let Some((node, event)) = session.take(at_ns, &frame) {
+            plain.look(&watch.listener, &watch.source.state(), watch.open_since_ns, at_ns)?;
+            if let Some((node, event)) = watch.take(at_ns, &frame) {
                 plain.event(node, &event, at_ns)?;
             }
         }
-        plain.look(&session.listener, &session.source.state(), session.open_since_ns, session.source.now_ns())?;
-        if session.is_over() {
-            return plain.finish(&session.listener, &session.source);
+        plain.look(&watch.listener, &watch.source.state(), watch.open_since_ns, watch.source.now_ns())?;
+        if watch.is_over() {
+            return plain.finish(&watch.listener, &watch.source);
         }
         if quiet {
             plain.flush()?;
@@ -152,9 +152,9 @@ mod tests {
         std::fs::write(&path, log).unwrap();
         let words: Vec<&str> = ["--log", path.to_str().unwrap()].iter().chain(words).copied().collect();
         let args = args(&words);
-        let mut session = session(&args, false).unwrap();
+        let mut watch = watch(&args, false).unwrap();
         let mut out = Vec::new();
-        lines(&mut session, Plain::new(&mut out, args.json)).unwrap();
+        lines(&mut watch, Plain::new(&mut out, args.json)).unwrap();
         String::from_utf8(out).unwrap()
     }
 

@@ -12,13 +12,14 @@ pub mod controller;
 pub mod node;
 pub mod plain;
 pub mod screen;
-pub mod session;
+
 pub mod source;
 pub mod terminal;
 #[cfg(test)]
 pub(crate) mod testing;
 pub mod traffic;
 pub mod verdict;
+pub mod watch;
 
 use std::collections::BTreeMap;
 
@@ -28,8 +29,8 @@ use fencepost_hal::can::CanFrame;
 
 use crate::scans::WholeScan;
 use node::Node;
-pub use session::Session;
 use traffic::Traffic;
+pub use watch::Watch;
 
 /// Everything that was heard so far.
 #[derive(Debug)]

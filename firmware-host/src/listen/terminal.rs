@@ -12,7 +12,7 @@ use ratatui::{
 };
 
 use super::{
-    Listener, Session,
+    Listener, Watch,
     screen::{self, Palette, View},
 };
 
@@ -32,29 +32,29 @@ enum Wish {
     Faster(f64),
 }
 
-/// Shows what is heard until the user or the session ends it.
+/// Shows what is heard until the user or the watch ends it.
 ///
 /// # Errors
 /// When the terminal cannot be used.
-pub fn run(session: &mut Session, name: &str) -> io::Result<()> {
+pub fn run(watch: &mut Watch, name: &str) -> io::Result<()> {
     let mut terminal = ratatui::try_init()?;
-    let result = show(&mut terminal, session, name);
+    let result = show(&mut terminal, watch, name);
     let restored = ratatui::try_restore();
     result.and(restored)
 }
 
-fn show(terminal: &mut DefaultTerminal, session: &mut Session, name: &str) -> io::Result<()> {
+fn show(terminal: &mut DefaultTerminal, watch: &mut Watch, name: &str) -> io::Result<()> {
     let palette = Palette::from_environment();
     let mut node = None;
     let mut next_picture = Instant::now();
     loop {
-        while let Some((at_ns, frame)) = session.next_frame() {
-            session.take(at_ns, &frame);
+        while let Some((at_ns, frame)) = watch.next_frame() {
+            watch.take(at_ns, &frame);
         }
-        let over = session.is_over();
+        let over = watch.is_over();
         if Instant::now() >= next_picture || over {
             next_picture = Instant::now() + PICTURE;
-            terminal.draw(|frame| screen::draw(frame, &view(session, name, node, palette)))?;
+            terminal.draw(|frame| screen::draw(frame, &view(watch, name, node, palette)))?;
         }
         if over {
             return Ok(());
@@ -73,30 +73,30 @@ fn show(terminal: &mut DefaultTerminal, session: &mut Session, name: &str) -> io
         };
         match wish {
             Wish::Quit => return Ok(()),
-            Wish::Next(steps) => node = next(&session.listener, node, steps),
-            Wish::Nothing | Wish::Hold | Wish::Again | Wish::Faster(_) => play(session, wish),
+            Wish::Next(steps) => node = next(&watch.listener, node, steps),
+            Wish::Nothing | Wish::Hold | Wish::Again | Wish::Faster(_) => play(watch, wish),
         }
     }
 }
 
-fn view<'a>(session: &'a Session, name: &'a str, node: Option<NodeId>, palette: Palette) -> View<'a> {
-    let source = &session.source;
+fn view<'a>(watch: &'a Watch, name: &'a str, node: Option<NodeId>, palette: Palette) -> View<'a> {
+    let source = &watch.source;
     let now_ns = source.now_ns();
     View {
-        listener: &session.listener,
+        listener: &watch.listener,
         name,
         state: source.state(),
-        bitrate: session.bitrate.or(source.bitrate()),
+        bitrate: watch.bitrate.or(source.bitrate()),
         condition: source.condition(),
         unreadable: source.unreadable(),
         log: source.as_log().map(|log| {
             let (at_ns, all_ns) = log.progress();
             (at_ns as f64 * 1.0e-9, all_ns as f64 * 1.0e-9, log.speed())
         }),
-        echo: session.controller.as_ref().map(super::controller::Controller::counts),
+        echo: watch.controller.as_ref().map(super::controller::Controller::counts),
         node,
-        since_ns: session.since_ns,
-        open_since_ns: session.open_since_ns,
+        since_ns: watch.since_ns,
+        open_since_ns: watch.open_since_ns,
         now_ns,
         palette,
     }
@@ -120,13 +120,13 @@ fn wish(key: KeyEvent) -> Wish {
 }
 
 /// What can be done with a log only.
-fn play(session: &mut Session, wish: Wish) {
-    let Some(log) = session.source.log_mut() else { return };
+fn play(watch: &mut Watch, wish: Wish) {
+    let Some(log) = watch.source.log_mut() else { return };
     match wish {
         Wish::Hold => log.pause(),
         Wish::Again => {
             log.restart();
-            session.forget();
+            watch.forget();
         }
         Wish::Faster(factor) => {
             let speed = log.speed() * factor;
@@ -148,9 +148,9 @@ fn next(listener: &Listener, node: Option<NodeId>, steps: isize) -> Option<NodeI
 mod tests {
     use super::*;
     use crate::listen::{
-        session::Limits,
         source::{LogSource, Source, SourceState},
         testing::{Speaker, node},
+        watch::Limits,
     };
     use fencepost_core::wire::BaseId;
 
@@ -187,17 +187,17 @@ mod tests {
         let frames: Vec<_> = speaker.heartbeat().into_iter().chain(speaker.scan()).collect();
         let log: String = frames.iter().map(|frame| format!("(5.000000) can0 {frame}\n")).collect();
         let source = Source::Log(LogSource::new(log.as_bytes(), None, 1.0));
-        let mut session = Session::new(source, (BaseId::DEFAULT, None), Limits::default());
+        let mut watch = Watch::new(source, (BaseId::DEFAULT, None), Limits::default());
         for _ in 0..2 {
-            while let Some((at_ns, frame)) = session.next_frame() {
-                session.take(at_ns, &frame);
+            while let Some((at_ns, frame)) = watch.next_frame() {
+                watch.take(at_ns, &frame);
             }
-            assert_eq!((session.listener.scans(), session.source.state()), (1, SourceState::Ended));
-            assert!(!session.is_over(), "the last picture stays until the user has seen it");
-            play(&mut session, Wish::Again);
-            assert_eq!(session.listener.scans(), 0);
+            assert_eq!((watch.listener.scans(), watch.source.state()), (1, SourceState::Ended));
+            assert!(!watch.is_over(), "the last picture stays until the user has seen it");
+            play(&mut watch, Wish::Again);
+            assert_eq!(watch.listener.scans(), 0);
         }
-        play(&mut session, Wish::Faster(1e9));
-        assert_eq!(session.source.as_log().unwrap().speed(), 64.0);
+        play(&mut watch, Wish::Faster(1e9));
+        assert_eq!(watch.source.as_log().unwrap().speed(), 64.0);
     }
 }

@@ -12,8 +12,10 @@ use std::time::{Duration, SystemTime};
 
 use embedded_can::{Frame as _, StandardId};
 use socketcan::{
-    CanAddr, CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, CanFilter, CanRemoteFrame, Frame as _, Socket as _,
-    SocketOptions as _, id::FdFlags,
+    CanAddr, CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, CanRemoteFrame, Frame as _, Socket as _,
+    SocketOptions as _,
+    id::FdFlags,
+    socket::{CAN_RAW_FILTER, SOL_CAN_RAW},
 };
 
 use super::{BusCondition, BusErrorKind, CanBus, CanFrame, ControllerState};
@@ -40,8 +42,8 @@ const REMOTE_FLAG: u32 = 0x4000_0000;
 /// A node on a CAN interface of Linux: real controllers, `vcan` and `vxcan`.
 ///
 /// Opens the interface by itself and opens it again when it was down or gone, at most every 50 ms; until then, every call says
-/// [`Down`](BusErrorKind::Down) or [`Gone`](BusErrorKind::Gone) without asking the kernel. Sending and receiving take no
-/// memory and never wait.
+/// [`Down`](BusErrorKind::Down) or [`Gone`](BusErrorKind::Gone) without asking the kernel. Sending, receiving and opening again
+/// take no memory and never wait.
 ///
 /// # The kernel's queue
 /// Frames go through the queue of the interface, 10 frames by default (`txqueuelen`), and a few more places in the controller.
@@ -57,7 +59,8 @@ pub struct SocketCan {
     interface: Arc<str>,
     carrier_file: Option<PathBuf>,
     fd: bool,
-    filters: Vec<CanFilter>,
+    /// In the kernel's form, so that opening again takes no memory.
+    filters: Vec<u8>,
     link: Link,
     condition: BusCondition,
     /// When a controller that is off the bus is looked at once more.
@@ -89,8 +92,11 @@ impl IdFilter {
         Self { id: id.as_raw(), mask: mask & 0x7FF }
     }
 
-    fn for_kernel(self) -> CanFilter {
-        CanFilter::new(u32::from(self.id), u32::from(self.mask) | EXTENDED_FLAG | REMOTE_FLAG)
+    /// As the kernel reads it: `struct can_filter` of linux/can.h.
+    fn for_kernel(self) -> [u8; 8] {
+        let mask = u32::from(self.mask) | EXTENDED_FLAG | REMOTE_FLAG;
+        let ([a, b, c, d], [e, f, g, h]) = (u32::from(self.id).to_ne_bytes(), mask.to_ne_bytes());
+        [a, b, c, d, e, f, g, h]
     }
 }
 
@@ -119,7 +125,7 @@ impl SocketCan {
     /// Receives only what one of `filters` lets through; everything if there is none.
     #[must_use]
     pub fn with_filters(mut self, filters: &[IdFilter]) -> Self {
-        self.filters = filters.iter().map(|filter| filter.for_kernel()).collect();
+        self.filters = filters.iter().flat_map(|filter| filter.for_kernel()).collect();
         self.link = Link::Closed { problem: SocketCanProblem::NotThere, retry_ns: 0 };
         self
     }
@@ -255,7 +261,7 @@ impl CanBus for SocketCan {
     }
 }
 
-fn open(interface: &Arc<str>, filters: &[CanFilter]) -> Result<CanFdSocket, SocketCanProblem> {
+fn open(interface: &Arc<str>, filters: &[u8]) -> Result<CanFdSocket, SocketCanProblem> {
     let problem = |error: io::Error| SocketCanError::of(interface, &error, false).problem();
     let address = CanAddr::from_iface(interface).map_err(problem)?;
     let socket = CanFdSocket::open_addr(&address).map_err(|error| match problem(error) {
@@ -267,7 +273,7 @@ fn open(interface: &Arc<str>, filters: &[CanFilter]) -> Result<CanFdSocket, Sock
     socket.set_error_filter(error_frame::ALL_CLASSES).map_err(problem)?;
     socket.set_recv_timestamp(true).map_err(problem)?;
     if !filters.is_empty() {
-        socket.set_filters(filters).map_err(problem)?;
+        socket.set_socket_option_bytes(SOL_CAN_RAW, CAN_RAW_FILTER, filters).map_err(problem)?;
     }
     // Less room is no reason not to begin.
     let _ = socket.as_raw_socket().set_recv_buffer_size(RECEIVE_BUFFER);

@@ -18,7 +18,7 @@ pub struct Limits {
 
 /// What listens, to what, and how long.
 #[derive(Debug)]
-pub struct Session {
+pub struct Watch {
     /// What was heard.
     pub listener: Listener,
     /// Where frames come from.
@@ -35,7 +35,7 @@ pub struct Session {
     whom: (BaseId, Option<NodeId>),
 }
 
-impl Session {
+impl Watch {
     /// Listens to `source`: to the nodes of a base, or to one of them.
     pub fn new(source: Source, whom: (BaseId, Option<NodeId>), limits: Limits) -> Self {
         let since_ns = source.now_ns();
