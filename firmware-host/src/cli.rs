@@ -32,6 +32,8 @@ Examples:
       Only frames 100 to 199, only the tables and the CAN log
   fencepost can decode out/garden/can.log
       The messages of a CAN log as text
+  fencepost listen can0
+      What the nodes on a bus see, live, and whether a vehicle may drive by it
 
 Recordings:
   A folder in the layout of KITTI odometry (image_0/, image_1/, calib.txt,
@@ -63,6 +65,9 @@ pub enum Command {
     /// Work with CAN logs.
     #[command(subcommand)]
     Can(CanCommand),
+    /// Show what the nodes on a CAN bus say, live: map, distances, health, losses, load.
+    #[command(after_help = LISTEN_HELP)]
+    Listen(ListenArgs),
 }
 
 /// Arguments of `demo`.
@@ -229,6 +234,60 @@ fn identifier(text: &str) -> Result<u16, ParseIntError> {
         Some(digits) => u16::from_str_radix(digits, 16),
         None => text.parse(),
     }
+}
+
+const LISTEN_HELP: &str = "\
+Without a terminal, as in a pipe, a line is written for each scan and for each
+change. Listening needs no rights; bringing the interface up needs root:
+  sudo ip link set can0 up type can bitrate 500000";
+
+/// Arguments of `listen`.
+#[derive(Debug, Args)]
+pub struct ListenArgs {
+    /// CAN interface, such as can0; of a log, only the frames of this interface.
+    #[arg(required_unless_present = "log")]
+    pub interface: Option<String>,
+    /// Play a log in candump's format instead of listening to an interface.
+    #[arg(long, value_name = "FILE")]
+    pub log: Option<PathBuf>,
+    /// Play the log that many times as fast; without a terminal it is read at once if this is left out.
+    #[arg(long, value_name = "X", requires = "log", value_parser = positive)]
+    pub speed: Option<f64>,
+    /// Only this node.
+    #[arg(long, value_name = "N")]
+    pub node: Option<u8>,
+    /// First identifier of the nodes, decimal or as 0x500.
+    #[arg(long, value_name = "ID", default_value = "0x400", value_parser = identifier)]
+    pub base_id: u16,
+    /// Bit rate of the bus, bit/s, for its load; that of the interface if left out.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_000..=100_000_000))]
+    pub bitrate: Option<u32>,
+    /// Act as a vehicle's controller: say which scans were taken over and how the vehicle moves.
+    #[arg(long, conflicts_with = "log")]
+    pub echo: bool,
+    /// Speed that --echo tells, m/s.
+    #[arg(long, value_name = "V", default_value_t = 0.0, requires = "echo", allow_negative_numbers = true)]
+    pub speed_m_per_s: f64,
+    /// Turning rate to the left that --echo tells, degrees/s.
+    #[arg(long, value_name = "W", default_value_t = 0.0, requires = "echo", allow_negative_numbers = true)]
+    pub yaw_rate_deg_per_s: f64,
+    /// A line for each scan and each change instead of the live view.
+    #[arg(long)]
+    pub plain: bool,
+    /// The same lines as JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// End after that many whole scans.
+    #[arg(long, value_name = "N")]
+    pub count: Option<u64>,
+    /// End after that many seconds.
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub seconds: Option<f64>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if value > 0.0 { Ok(value) } else { Err("must be above zero".to_owned()) }
 }
 
 /// One kind of output of `replay`.

@@ -10,6 +10,8 @@
 //!                        └──> report     report.html
 //! ```
 //!
+//! `listen` goes the other way: [`listen`] shows what is on a bus.
+//!
 //! Everything that can go wrong is a [`error::Failure`]: what is wrong, where, and the mend. The exit status is 0 if
 //! everything worked, 1 if the work failed or the input is bad, 2 if the program was called wrongly or its configuration
 //! cannot be used.
@@ -22,12 +24,14 @@ pub mod config;
 pub mod console;
 pub mod detector;
 pub mod error;
+pub mod listen;
 pub mod live;
 pub mod output;
 pub mod paint;
 pub mod pipeline;
 pub mod record;
 pub mod report;
+pub mod scans;
 pub mod source;
 pub mod stopwatch;
 pub mod summary;
@@ -62,6 +66,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Record(args) => commands::record_rig(&args, &mut console),
         Command::Cameras(args) => commands::cameras(&args, &mut console),
         Command::Can(CanCommand::Decode(args)) => commands::decode(&args, &console),
+        Command::Listen(args) => commands::listen(&args, &console),
     };
     match result {
         Ok(ending) => ExitCode::from(ending.exit_status()),

@@ -4,6 +4,7 @@ use fencepost_core::{
     detector::Stage,
     disparity::Reason,
     health::{Health, HealthLevel, HealthReason},
+    wire::NodeState,
 };
 
 /// Name of a level as it is written in files.
@@ -50,6 +51,21 @@ pub const fn stage_words(stage: Stage) -> &'static str {
         Stage::Map => "sorts everything into cells",
         Stage::Health => "judges how far all this can be trusted",
     }
+}
+
+/// What a node is doing.
+pub const fn state_name(state: NodeState) -> &'static str {
+    match state {
+        NodeState::Starting => "starting",
+        NodeState::Running => "running",
+        NodeState::Stopping => "stopping",
+        NodeState::Fault => "fault",
+    }
+}
+
+/// Degrees of a tilt on the wire, which is in twentieths of a degree.
+pub fn tilt_deg(value: i16) -> f64 {
+    f64::from(value) / 20.0
 }
 
 /// A number of bytes for people.

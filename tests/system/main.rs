@@ -7,6 +7,7 @@ mod cells;
 mod disparity;
 mod golden;
 mod ground;
+mod health;
 mod joining;
 mod rover;
 mod slope;

@@ -13,7 +13,7 @@ use crate::{
     error::ConfigError,
     geometry::{DepthTable, Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
     ground::{GroundFinder, GroundPlane, Terrain},
-    health::{self, Exposure, HealthSettings, Signs},
+    health::{self, Content, ContentSigns, Debounce, Exposure, HealthLevel, HealthSettings, SearchRange, Signs},
     map::{MapBuilder, SectorDistances, View},
     matching::{MatchSettings, Matcher, ValidSpan},
     obstacles::ObstacleFinder,
@@ -57,6 +57,10 @@ pub struct Detector<
     obstacles: ObstacleFinder,
     map: MapBuilder<CELLS>,
     health: HealthSettings,
+    content: Content<WIDTH>,
+    content_signs: ContentSigns,
+    exposures: Option<[Exposure; 2]>,
+    debounce: Debounce,
     /// One row of disparities, for looking at a few rows the other way round.
     probe_row: [DisparityPixel; WIDTH],
     detection: Detection<OBSTACLES, CELLS>,
@@ -103,6 +107,10 @@ impl<
             obstacles: ObstacleFinder::new(),
             map: MapBuilder::new(),
             health: HealthSettings::UNSET,
+            content: Content::new(),
+            content_signs: ContentSigns::UNSET,
+            exposures: None,
+            debounce: Debounce::new(0, 0),
             probe_row: [DisparityPixel::from_bits(0); WIDTH],
             detection: Detection::new(),
         }
@@ -136,6 +144,9 @@ impl<
         self.map.configure(&settings.map, (settings.obstacles.min_height_m, settings.obstacles.clearance_m))?;
         settings.health.check()?;
         self.health = settings.health;
+        self.content.clear();
+        self.exposures = None;
+        self.debounce = Debounce::new(settings.health.trigger_frames, settings.health.release_frames);
         // The last disparity has no neighbour to interpolate with and is never reported.
         let largest = f32::from(min_disparity) + f32::from(disparities) - 2.0;
         let nearest_m = pair.distance_m(largest);
@@ -202,22 +213,32 @@ impl<
         let Setup { pair, frame, place, rays, nearest_m, .. } = &setup;
         let view = View { pair, frame, place, rays, depth: &self.depth, nearest_m: *nearest_m };
         self.map.run(&self.surfaces, picture, &view, &terrain, ground.is_some(), &mut detection.map);
-        detection.sectors = SectorDistances::of(&detection.map, setup.sector_width_deg);
         detection.ground = ground.map(|plane| plane.moved(place));
         detection.statistics.count(picture, report, self.surfaces.table(), &detection.map);
 
         probe.enter(Stage::Health);
         let suspect = 100.0 * self.detection.statistics.coverage() < self.health.exchange_test_percent;
         let exchanged = suspect && self.matches_exchanged(left, right, width, height);
+        self.content_signs = self.content.signs(self.health.structure_grey);
+        let exposures = [Exposure::of(left), Exposure::of(right)];
         let signs = Signs {
-            left: Exposure::of(left),
-            right: Exposure::of(right),
+            exposures,
+            exposures_before: self.exposures.replace(exposures),
+            content: self.content_signs,
             picture: DisparityPicture::new(&self.disparity[..width * height], width),
             statistics: &self.detection.statistics,
             ground: self.detection.ground.as_ref(),
             exchanged,
         };
-        self.detection.health = health::judge(&signs, &self.health);
+        let findings = health::judge(&signs, &self.health);
+        let told = health::explained(self.debounce.update(&findings));
+        // What is told may come later than what is found, and stay longer; what is free must be right at any time.
+        if findings.health().level.max(told.level) >= HealthLevel::Blind {
+            self.detection.map.withhold_free();
+            self.detection.statistics.cells_free = 0;
+        }
+        self.detection.health = told;
+        self.detection.sectors = SectorDistances::of(&self.detection.map, setup.sector_width_deg);
         Ok(&self.detection)
     }
 
@@ -231,6 +252,10 @@ impl<
         probe: &mut impl Probe,
     ) {
         self.matcher.begin();
+        let MatchSettings { min_disparity, disparities, .. } = *self.matcher.settings();
+        let first = usize::from(min_disparity);
+        let range = SearchRange { first, last: first + usize::from(disparities).saturating_sub(1) };
+        self.content.begin(width, height, range);
         let [left_row, right_row] = &mut self.rows;
         let mut next = 0;
         for y in 0..height {
@@ -238,18 +263,18 @@ impl<
             let left_span = self.rectifier.row(Side::Left, left, y, &mut left_row[..width]);
             let right_span = self.rectifier.row(Side::Right, right, y, &mut right_row[..width]);
             probe.enter(Stage::Match);
-            self.matcher.push(
-                &left_row[..width],
-                &right_row[..width],
-                ValidSpan::from(left_span),
-                ValidSpan::from(right_span),
-            );
+            let (left_row, right_row) = (&left_row[..width], &right_row[..width]);
+            let spans = [ValidSpan::from(left_span), ValidSpan::from(right_span)];
+            self.matcher.push(left_row, right_row, spans[0], spans[1]);
             while let Some(out) = self.disparity.get_mut(next * width..(next + 1) * width) {
                 if !self.matcher.pull(next, out) {
                     break;
                 }
                 next += 1;
             }
+            probe.enter(Stage::Health);
+            self.content.push(y, [left_row, right_row], spans);
+            self.content.look(&self.matcher, &self.disparity, width, next);
         }
     }
 
@@ -320,6 +345,11 @@ impl<
     /// The surfaces of the last pair and the tables behind them.
     pub const fn surfaces(&self) -> &Surfaces<PIXELS, SURFACES> {
         &self.surfaces
+    }
+
+    /// What the last pair of pictures said about the cameras.
+    pub const fn content(&self) -> &ContentSigns {
+        &self.content_signs
     }
 
     /// The rectifier, to draw on rectified pictures.

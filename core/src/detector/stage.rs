@@ -45,7 +45,8 @@ impl Stage {
 
 /// Watches the stages go by. The core reads no clock: a program that wants times brings one here.
 ///
-/// Rectification and matching take turns row by row, so `enter` is called up to twice for each row.
+/// Rectification, matching and the look at the rows for the health take turns row by row, so `enter` is called up to three times
+/// for each row.
 pub trait Probe {
     /// The work that follows belongs to `stage`.
     fn enter(&mut self, stage: Stage);

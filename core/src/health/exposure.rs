@@ -1,4 +1,4 @@
-//! How a picture is exposed.
+//! How a picture is exposed, and whether it is the one that came before.
 
 use crate::picture::Picture;
 
@@ -20,6 +20,11 @@ pub struct Exposure {
     pub dark_percent: f32,
     /// Share of the pixels that are nearly white, percent.
     pub bright_percent: f32,
+    /// Stands for the values of all pixels that were looked at; `None` if they are all the same, which says nothing.
+    ///
+    /// The noise of a sensor makes two pictures of the same thing different somewhere, so that the same number twice means the
+    /// same picture twice. Source: FNV-1a (Fowler, Noll, Vo), 64 bits.
+    pub fingerprint: Option<u64>,
 }
 
 impl Exposure {
@@ -29,11 +34,14 @@ impl Exposure {
     /// `width x height / 16` steps.
     pub fn of(picture: &Picture<'_>) -> Self {
         let (mut sum, mut dark, mut bright, mut count) = (0u32, 0u32, 0u32, 0u32);
+        let (mut least, mut most, mut hash) = (u8::MAX, u8::MIN, 0xcbf2_9ce4_8422_2325_u64);
         for y in (0..picture.height()).step_by(STEP) {
             for &grey in picture.row(y).iter().step_by(STEP) {
                 sum = sum.saturating_add(u32::from(grey));
                 dark += u32::from(grey <= DARK);
                 bright += u32::from(grey >= BRIGHT);
+                (least, most) = (least.min(grey), most.max(grey));
+                hash = (hash ^ u64::from(grey)).wrapping_mul(0x0000_0100_0000_01b3);
                 count += 1;
             }
         }
@@ -42,6 +50,7 @@ impl Exposure {
             mean: sum as f32 * each,
             dark_percent: 100.0 * dark as f32 * each,
             bright_percent: 100.0 * bright as f32 * each,
+            fingerprint: (least < most).then_some(hash),
         }
     }
 }

@@ -93,6 +93,12 @@ impl HealthReason {
         }
     }
 
+    /// Whether one moment proves it: counted or read off, not estimated. Such a reason is told at once, others when they have
+    /// been found more than once; see [`super::Debounce`].
+    pub const fn is_plain(self) -> bool {
+        !matches!(self, Self::Blocked | Self::BadlyPaired | Self::BadlyRectified | Self::Late | Self::CommandTrouble)
+    }
+
     /// The reason in words.
     pub const fn describe(self) -> &'static str {
         match self {
@@ -137,6 +143,12 @@ impl Health {
     pub fn raise(&mut self, reason: HealthReason, level: HealthLevel) {
         self.reasons |= 1 << reason as u8;
         self.level = self.level.max(level);
+    }
+
+    /// Both together: the worse level, and the reasons of both.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self { level: self.level.max(other.level), reasons: self.reasons | other.reasons }
     }
 
     /// Whether `reason` was given.

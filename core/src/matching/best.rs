@@ -45,7 +45,7 @@ fn smallest(costs: &[u16]) -> u16 {
 /// slope through the three costs, which suits sums of absolute differences better than a parabola.
 ///
 /// `farther` is the cost at one disparity less, `nearer` at one more.
-pub(super) fn refine(farther: i32, best: i32, nearer: i32) -> i32 {
+pub(crate) fn refine(farther: i32, best: i32, nearer: i32) -> i32 {
     let slope = farther.max(nearer) - best;
     if slope <= 0 {
         return 0;

@@ -8,9 +8,12 @@ mod columns;
 mod prefilter;
 mod rows;
 mod settings;
+mod strip;
 
+pub(crate) use best::refine;
 pub use rows::ValidSpan;
 pub use settings::{MatchSettings, Prefilter};
+pub(crate) use strip::Strip;
 
 use crate::{
     disparity::{DisparityPixel, Reason},

@@ -3,7 +3,7 @@
 use super::{MatchSettings, Prefilter, prefilter};
 
 /// Filtered rows that are kept: the window, and the one that leaves it.
-const KEPT: usize = MatchSettings::MAX_WINDOW as usize + 1;
+pub(super) const KEPT: usize = MatchSettings::MAX_WINDOW as usize + 1;
 
 /// Grey rows that are kept for the filter.
 const GREY: usize = 3;

@@ -1,7 +1,6 @@
 //! `can decode`: a CAN log as text.
 
 mod messages;
-mod scans;
 
 use std::{
     collections::BTreeMap,
@@ -15,9 +14,13 @@ use fencepost_hal::can::{CandumpLine, parse_candump};
 use serde_json::json;
 
 use super::Ending;
-use crate::{cli::DecodeArgs, console::Console, error::Failure};
+use crate::{
+    cli::DecodeArgs,
+    console::Console,
+    error::Failure,
+    scans::{Outcome, ScanAssembly},
+};
 use messages::Decoded;
-use scans::{Outcome, Scans};
 
 /// What was found in a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -76,14 +79,13 @@ struct Decoder<'a, W> {
     base: BaseId,
     out: W,
     counters: BTreeMap<u16, CounterCheck>,
-    scans: Scans,
+    scans: BTreeMap<NodeId, ScanAssembly>,
     counts: Counts,
 }
 
 impl<'a, W: Write> Decoder<'a, W> {
     fn new(args: &'a DecodeArgs, base: BaseId, out: W) -> Self {
-        let scans = Scans::new(base);
-        Self { args, base, out, counters: BTreeMap::new(), scans, counts: Counts::default() }
+        Self { args, base, out, counters: BTreeMap::new(), scans: BTreeMap::new(), counts: Counts::default() }
     }
 
     fn run(&mut self, log: &[u8]) -> io::Result<()> {
@@ -120,7 +122,7 @@ impl<'a, W: Write> Decoder<'a, W> {
                     _ => self.counts.refused += 1,
                 }
                 // The receiver has to know, so that it does not take the scan for whole.
-                self.scans.receive(address.node, id, line, None);
+                self.assemble(address.node, id, line, None);
                 return self.fault(Some(line), &error.to_string());
             }
         };
@@ -180,7 +182,7 @@ impl<'a, W: Write> Decoder<'a, W> {
     }
 
     fn scan(&mut self, line: &CandumpLine, node: NodeId, id: StandardId, packet: &Packet<'_>) -> io::Result<()> {
-        let whole = match self.scans.receive(node, id, line, Some(packet)) {
+        let whole = match self.assemble(node, id, line, Some(packet)) {
             Outcome::Quiet => return Ok(()),
             Outcome::GivenUp(reason) => {
                 self.counts.abandoned_scans += 1;
@@ -195,6 +197,11 @@ impl<'a, W: Write> Decoder<'a, W> {
         let (time, interface, node) = (time(line), &line.interface, node.get());
         writeln!(self.out, "{time:>16} {interface} node {node:<2} {:<13} {}", "whole scan", whole.text())?;
         if self.args.map { writeln!(self.out, "{}\n", whole.map()) } else { Ok(()) }
+    }
+
+    fn assemble(&mut self, node: NodeId, id: StandardId, line: &CandumpLine, packet: Option<&Packet<'_>>) -> Outcome {
+        let assembly = self.scans.entry(node).or_insert_with(|| ScanAssembly::new(Address { base: self.base, node }));
+        assembly.receive(id, line.frame.data(), line.timestamp_ns, packet)
     }
 
     fn fault(&mut self, line: Option<&CandumpLine>, what: &str) -> io::Result<()> {

@@ -1,9 +1,13 @@
 //! Tests with real V4L2 and CAN drivers, inside the guest. `tests/guest/run` runs them; docs/testing.md tells more.
 
 #[cfg(all(feature = "guest", target_os = "linux"))]
+mod buses;
+#[cfg(all(feature = "guest", target_os = "linux"))]
 mod cameras;
 #[cfg(all(feature = "guest", target_os = "linux"))]
 mod machinery;
+#[cfg(all(feature = "guest", target_os = "linux"))]
+mod program;
 
 #[cfg(not(all(feature = "guest", target_os = "linux")))]
 #[test]

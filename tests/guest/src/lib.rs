@@ -23,4 +23,5 @@ pub mod modules;
 pub mod net;
 pub mod program;
 pub mod resources;
+pub mod scans;
 pub mod vivid;

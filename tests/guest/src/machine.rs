@@ -8,6 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use rustix::thread::{CpuSet, sched_setaffinity};
+
 /// Time between two looks at what is waited for. Short against a frame period, long against a look.
 const LOOK_AGAIN: Duration = Duration::from_millis(2);
 
@@ -70,6 +72,17 @@ pub fn wait_for<T>(limit: Duration, mut look: impl FnMut() -> Option<T>) -> Opti
         }
         thread::sleep(LOOK_AGAIN);
     }
+}
+
+/// Runs the calling thread, and those that it starts from now on, on the first processor, which takes the interrupts of all
+/// devices.
+///
+/// # Panics
+/// When the system does not let it.
+pub fn on_first_processor() {
+    let mut first = CpuSet::new();
+    first.set(0);
+    sched_setaffinity(None, &first).unwrap_or_else(|error| panic!("the first processor: {error}"));
 }
 
 /// Prints a line past the test runner's capture.

@@ -4,10 +4,14 @@ use std::{
     fs,
     path::{Path, PathBuf},
     thread,
+    time::Duration,
 };
 
+use fencepost_hal::can::CanFrame;
+
 use crate::{
-    machine::{run, try_run, write_sys},
+    bus::{Listener, Speaker},
+    machine::{run, try_run, wait_for, write_sys},
     modules::Module,
 };
 
@@ -49,7 +53,8 @@ pub struct ControllerPair {
 impl Interface {
     /// A virtual bus on this machine that carries classic and FD frames.
     pub fn virtual_bus(name: &str) -> Self {
-        run("modprobe vcan");
+        // With an echo of its own: what is sent then passes the queue, where it can be disturbed, before anyone hears it.
+        run("modprobe vcan echo=1");
         let interface = Self { name: name.to_owned(), kind: Kind::Virtual };
         interface.bring_back();
         interface
@@ -161,11 +166,15 @@ impl Drop for Interface {
 
 impl ControllerPair {
     /// Two classic controllers on one bus, 500 kbit/s.
+    ///
+    /// The emulated bus takes no time: a frame is in the other controller at once, whose memory holds five. So whoever sends more
+    /// at a time has to run on the processor that takes the interrupts ([`on_first_processor`](crate::machine::on_first_processor)),
+    /// and the frames are fetched one by one. A remote frame spoils what comes after it.
     pub fn classic() -> Self {
         Self::load("kvaser_pci", BitRates::Classic(500_000))
     }
 
-    /// Two CAN FD controllers on one bus, 500 kbit/s and 2 Mbit/s.
+    /// Two CAN FD controllers on one bus, 500 kbit/s and 2 Mbit/s. Their memories hold a whole scan.
     pub fn fd() -> Self {
         Self::load("ctucanfd_pci", BitRates::Fd(500_000, 2_000_000))
     }
@@ -175,7 +184,23 @@ impl ControllerPair {
         let mut names = interfaces_of(driver);
         names.sort_unstable();
         let [a, b] = &names[..] else { panic!("{driver} has the interfaces {names:?}; two were expected") };
-        Self { a: Interface::controller(a, bit_rates), b: Interface::controller(b, bit_rates), _driver: module }
+        let pair =
+            Self { a: Interface::controller(a, bit_rates), b: Interface::controller(b, bit_rates), _driver: module };
+        pair.flush();
+        pair
+    }
+
+    /// The emulated controllers keep frames that nobody has fetched, whatever becomes of their driver.
+    fn flush(&self) {
+        let last: CanFrame = "7FF#FF".parse().expect("a frame");
+        for (from, to) in [(&self.a, &self.b), (&self.b, &self.a)] {
+            let listener = Listener::open(to.name());
+            Speaker::open(from.name()).send(&last).expect("the bus is up");
+            let came = wait_for(Duration::from_secs(5), || {
+                listener.heard().frames.last().filter(|(_, frame)| *frame == last).map(drop)
+            });
+            assert!(came.is_some(), "nothing comes from {} to {}", from.name(), to.name());
+        }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use fencepost_core::map::{SECTOR_CLEAR_DM, SECTOR_UNKNOWN};
 use fencepost_core::wire::{
-    CellsRepr, EndRepr, GroundRepr, HeaderRepr, HeartbeatRepr, MeaninglessValue, Message, NodeState, Packet,
-    ScanEchoRepr, SectorsRepr, VehicleMotionRepr, WireGround,
+    CellsRepr, EndRepr, GroundRepr, HeaderRepr, HeartbeatRepr, MeaninglessValue, Message, Packet, ScanEchoRepr,
+    SectorsRepr, VehicleMotionRepr, WireGround,
 };
 use serde_json::{Value, json};
 
@@ -39,18 +39,8 @@ impl Decoded {
     }
 }
 
-/// Tilts on the wire are twentieths of a degree.
-pub(super) fn tilt_deg(value: i16) -> f64 {
-    f64::from(value) / 20.0
-}
-
 fn heartbeat(heartbeat: &HeartbeatRepr) -> (String, Value) {
-    let state = match heartbeat.state {
-        NodeState::Starting => "starting",
-        NodeState::Running => "running",
-        NodeState::Stopping => "stopping",
-        NodeState::Fault => "fault",
-    };
+    let state = words::state_name(heartbeat.state);
     let level = words::level_name(heartbeat.health.level);
     let reasons = words::reason_names(heartbeat.health, ", ");
     let last = heartbeat.last_scan.map_or_else(|| "no scan yet".to_string(), |scan| format!("last scan {scan}"));
@@ -133,7 +123,7 @@ fn ground(ground: &GroundRepr) -> (String, Value) {
     match &ground.ground {
         Some(WireGround { age_frames, camera_height_mm, pitch_down, roll }) => {
             let height_m = f64::from(*camera_height_mm) / 1000.0;
-            let (pitch, roll) = (tilt_deg(*pitch_down), tilt_deg(*roll));
+            let (pitch, roll) = (words::tilt_deg(*pitch_down), words::tilt_deg(*roll));
             let held = if *age_frames > 0 { format!(", {age_frames} frames old") } else { String::new() };
             let fields = json!({
                 "scan_low": ground.scan_low,

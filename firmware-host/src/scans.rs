@@ -1,50 +1,45 @@
-//! Whole scans, put together by the receiver of the core.
-
-use std::collections::BTreeMap;
+//! Whole scans, put together by the receiver of the core, to be looked at.
 
 use embedded_can::StandardId;
-use fencepost_core::wire::{
-    Abandoned, Address, BaseId, CellsRepr, EndRepr, GroundRepr, HeaderRepr, Message, NodeId, Packet, Received,
-    ReceiverConfig, Run, ScanReceiver, WireGround,
+use fencepost_core::{
+    map::SectorDistances,
+    wire::{
+        Abandoned, Address, CellsRepr, EndRepr, GroundRepr, HeaderRepr, Message, Packet, Received, ReceiverConfig, Run,
+        ScanReceiver, SectorsRepr, WireGround,
+    },
 };
-use fencepost_hal::can::CandumpLine;
 use serde_json::{Value, json};
 
-use super::messages::tilt_deg;
 use crate::words;
 
 /// Most runs of cells in a scan: 255 frames of 8.
 const RUNS: usize = 255 * CellsRepr::FD_RUNS;
 
-/// A receiver for each node that was heard.
+/// Puts the scans of one node together.
+///
+/// The receiver decides whether a scan is whole; what it holds is kept beside it, since the receiver lends it only while a
+/// controller may drive by it, and whoever looks wants to see it in any case.
 #[derive(Debug)]
-pub(super) struct Scans {
-    base: BaseId,
-    nodes: BTreeMap<NodeId, Node>,
-}
-
-/// The receiver decides whether a scan is whole; what it holds is kept beside it, since the receiver lends it only while
-/// heartbeats come, and a log may begin anywhere.
-#[derive(Debug)]
-struct Node {
+pub struct ScanAssembly {
     receiver: Box<ScanReceiver<RUNS>>,
     parts: Parts,
 }
 
 #[derive(Clone, Debug, Default)]
 struct Parts {
-    header: Option<HeaderRepr>,
+    header: Option<(HeaderRepr, u64)>,
     runs: Vec<Run>,
+    sectors: SectorDistances,
     ground: Option<WireGround>,
     end: Option<EndRepr>,
 }
 
 /// What a message did to the scan of its node.
 #[derive(Debug)]
-pub(super) enum Outcome {
+pub enum Outcome {
     /// Nothing that is worth a word.
     Quiet,
-    /// The scan is given up.
+    /// The scan is given up, and why.
     GivenUp(&'static str),
     /// The scan is whole.
     Whole(WholeScan),
@@ -52,69 +47,90 @@ pub(super) enum Outcome {
 
 /// A scan that came whole.
 #[derive(Clone, Debug)]
-pub(super) struct WholeScan {
-    header: HeaderRepr,
-    end: EndRepr,
-    ground: Option<WireGround>,
+pub struct WholeScan {
+    /// What its header said.
+    pub header: HeaderRepr,
+    /// When that came, nanoseconds.
+    pub header_ns: u64,
+    /// What its end said.
+    pub end: EndRepr,
+    /// Nearest obstacle by direction.
+    pub sectors: SectorDistances,
+    /// The ground plane, if there is one.
+    pub ground: Option<WireGround>,
     /// `(i, j, obstacle)` in the order in which they came.
-    cells: Vec<(i8, i8, bool)>,
+    pub cells: Vec<(i8, i8, bool)>,
 }
 
-impl Scans {
-    pub(super) const fn new(base: BaseId) -> Self {
-        Self { base, nodes: BTreeMap::new() }
+impl ScanAssembly {
+    /// For the node at `address`.
+    pub fn new(address: Address) -> Self {
+        Self { receiver: Box::new(ScanReceiver::new(ReceiverConfig::new(address))), parts: Parts::default() }
     }
 
-    /// Hands a frame to the receiver of its node; `packet` is the frame if its checks hold.
-    pub(super) fn receive(
-        &mut self,
-        node: NodeId,
-        id: StandardId,
-        line: &CandumpLine,
-        packet: Option<&Packet<'_>>,
-    ) -> Outcome {
-        let address = Address { base: self.base, node };
-        let Node { receiver, parts } = self.nodes.entry(node).or_insert_with(|| Node {
-            receiver: Box::new(ScanReceiver::new(ReceiverConfig::new(address))),
-            parts: Parts::default(),
-        });
+    /// Takes a frame of the node that came at `now_ns`; `packet` is the frame if its checks hold.
+    pub fn receive(&mut self, id: StandardId, data: &[u8], now_ns: u64, packet: Option<&Packet<'_>>) -> Outcome {
         if let Some(packet) = packet {
-            parts.take(packet);
+            self.parts.take(packet, now_ns);
         }
-        match receiver.receive(id, line.frame.data(), line.timestamp_ns) {
-            Ok(Received::Scan { .. }) => parts.clone().whole().map_or(Outcome::Quiet, Outcome::Whole),
+        match self.receiver.receive(id, data, now_ns) {
+            Ok(Received::Scan { .. }) => self.parts.clone().whole().map_or(Outcome::Quiet, Outcome::Whole),
             Ok(Received::Abandoned(reason)) => Outcome::GivenUp(words_of(reason)),
             Ok(Received::Old) => Outcome::GivenUp("its index is not newer than that of the scan before"),
             // What a damaged message breaks is said when the next one does not fit.
             Ok(_) | Err(_) => Outcome::Quiet,
         }
     }
+
+    /// The receiver, which knows whether a controller may drive by the newest scan.
+    pub const fn receiver(&self) -> &ScanReceiver<RUNS> {
+        &self.receiver
+    }
 }
 
 impl Parts {
-    fn take(&mut self, packet: &Packet<'_>) {
+    fn take(&mut self, packet: &Packet<'_>, now_ns: u64) {
         let data = packet.data();
         match packet.message() {
-            Message::Header => *self = Self { header: HeaderRepr::parse(data).ok(), ..Self::default() },
+            Message::Header => {
+                let header = HeaderRepr::parse(data).ok().map(|header| (header, now_ns));
+                *self = Self { header, ..Self::default() };
+            }
             Message::Cells | Message::CellsFd => {
                 self.runs.extend(CellsRepr::parse(data).iter().flat_map(|cells| cells.runs.into_iter().flatten()));
             }
+            Message::Sectors => self.take_sectors(data),
             Message::Ground => self.ground = GroundRepr::parse(data).ok().and_then(|ground| ground.ground),
             Message::End => self.end = EndRepr::parse(data).ok(),
             _ => {}
         }
     }
 
+    fn take_sectors(&mut self, data: &[u8]) {
+        match SectorsRepr::parse(data) {
+            Ok(SectorsRepr::Distances { part, distance_dm, .. }) => {
+                let first = usize::from(part) * distance_dm.len();
+                self.sectors.distance_dm.iter_mut().skip(first).zip(distance_dm).for_each(|(to, from)| *to = from);
+            }
+            Ok(SectorsRepr::Layout { layout, .. }) => {
+                self.sectors.left_deg = f32::from(layout.left_cdeg) / 100.0;
+                self.sectors.width_deg = f32::from(layout.width_cdeg) / 100.0;
+            }
+            Err(_) => {}
+        }
+    }
+
     fn whole(self) -> Option<WholeScan> {
+        let (header, header_ns) = self.header?;
         let cells = self.runs.iter().flat_map(|run| run.cells().map(|(i, j)| (i, j, run.obstacle))).collect();
-        Some(WholeScan { header: self.header?, end: self.end?, ground: self.ground, cells })
+        Some(WholeScan { header, header_ns, end: self.end?, sectors: self.sectors, ground: self.ground, cells })
     }
 }
 
 impl WholeScan {
     /// In a line.
-    pub(super) fn text(&self) -> String {
-        let obstacles = self.cells.iter().filter(|cell| cell.2).count();
+    pub fn text(&self) -> String {
+        let (obstacles, free) = self.counts();
         let nearest = match self.nearest_m() {
             Some((distance, x, y)) => format!(", the nearest {distance:.2} m away at ({x:.2}, {y:.2}) m"),
             None => String::new(),
@@ -123,12 +139,12 @@ impl WholeScan {
             "scan {}, health {}: {obstacles} obstacle cells{nearest}; {} free cells",
             self.header.scan_index,
             words::level_name(self.header.health),
-            self.cells.len() - obstacles
+            free
         )
     }
 
     /// As an object.
-    pub(super) fn json(&self, time_s: f64, node: u8) -> Value {
+    pub fn json(&self, time_s: f64, node: u8) -> Value {
         let cells: Vec<_> = self
             .cells
             .iter()
@@ -146,14 +162,14 @@ impl WholeScan {
             "age_ms": self.header.age_ns().map(|ns| ns / 1_000_000),
             "dropped_cells": self.end.dropped_cells,
             "camera_height_m": self.ground.map(|g| f64::from(g.camera_height_mm) / 1000.0),
-            "pitch_down_deg": self.ground.map(|g| tilt_deg(g.pitch_down)),
-            "roll_deg": self.ground.map(|g| tilt_deg(g.roll)),
+            "pitch_down_deg": self.ground.map(|g| words::tilt_deg(g.pitch_down)),
+            "roll_deg": self.ground.map(|g| words::tilt_deg(g.roll)),
             "cells": cells,
         })
     }
 
     /// A map of characters: the robot `^` looks up, `#` is an obstacle, `.` is free.
-    pub(super) fn map(&self) -> String {
+    pub fn map(&self) -> String {
         let Some((first_j, last_j)) = span(self.cells.iter().map(|cell| cell.1).chain([0])) else {
             return String::new();
         };
@@ -178,8 +194,19 @@ impl WholeScan {
         }
     }
 
-    /// Distance and place of the nearest obstacle cell's centre, metres.
-    fn nearest_m(&self) -> Option<(f64, f64, f64)> {
+    /// Time since exposure at `now_ns`, nanoseconds; `None` if the header only knows that it is long.
+    pub fn age_ns(&self, now_ns: u64) -> Option<u64> {
+        Some(self.header.age_ns()?.saturating_add(now_ns.saturating_sub(self.header_ns)))
+    }
+
+    /// Obstacle cells and free cells.
+    pub fn counts(&self) -> (usize, usize) {
+        let obstacles = self.cells.iter().filter(|cell| cell.2).count();
+        (obstacles, self.cells.len() - obstacles)
+    }
+
+    /// Distance and place `(x, y)` of the nearest obstacle cell's centre, metres.
+    pub fn nearest_m(&self) -> Option<(f64, f64, f64)> {
         let centres = self.cells.iter().filter(|cell| cell.2).map(|(i, j, _)| self.centre_m(*i, *j));
         centres.map(|(x, y)| (x.hypot(y), x, y)).min_by(|a, b| a.0.total_cmp(&b.0))
     }

@@ -1,0 +1,247 @@
+//! Sparse matches that look above and below the row, and nearer than the disparity range.
+
+use heapless::Vec;
+
+use crate::{
+    disparity::{DisparityPixel, Reason},
+    matching::{Strip, refine},
+};
+
+/// Strips down the picture and places across it at which a match is looked for.
+pub(crate) const STRIPS: usize = 16;
+const PLACES: usize = 8;
+
+/// Half the edge of the patches that are compared, px.
+const RADIUS: usize = 3;
+
+/// Rows above and below that are searched.
+const REACH: usize = 4;
+
+/// Rows of the matcher that are needed above and below the one that is looked at.
+pub(crate) const MARGIN: usize = RADIUS + REACH;
+
+/// Disparities to either side that are searched along with the rows: an edge that is not upright seems moved along the row
+/// when it is moved across.
+const ALONG: usize = 3;
+
+const PATCH: u32 = ((2 * RADIUS + 1) * (2 * RADIUS + 1)) as u32;
+
+/// Two rows off, a patch must fit worse by this for each pixel, filtered grey values: otherwise it does not say in which row it
+/// belongs.
+const LEAST_RISE: u32 = 2 * PATCH;
+
+/// Least contrast around a place that is worth looking at, filtered grey values, summed over 3 x 3 pixels.
+const LEAST_CONTRAST: u32 = 40;
+
+/// Places without a disparity that are looked for over the whole range, at most.
+const SEARCHES: usize = 64;
+
+/// How many times the disparity range is searched for what is too near.
+const NEARER: usize = 3;
+
+/// Fewer matches say nothing.
+const LEAST_MATCHES: usize = 12;
+const LEAST_PLACES: u16 = 8;
+
+/// What the sparse matches of one picture say.
+#[derive(Clone, Debug)]
+pub(crate) struct SparseMatches {
+    /// Rows by which the right picture lies lower, 1/16 px.
+    errors: Vec<i16, { STRIPS * PLACES }, u16>,
+    searches_left: usize,
+    /// Places in the lower half, and those among them that match nearer than the range by far the best.
+    lower: u16,
+    near: u16,
+}
+
+/// What the sparse matches say of the rows and of the near zone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowSign {
+    /// Middle one of the distances between the rows in which left and right show the same, px; 0 if there are too few matches.
+    pub error_px: f32,
+    /// Matches that say so.
+    pub matches: u16,
+    /// Share of the places in the lower half that match nearer than the disparity range reaches, percent.
+    pub near_percent: f32,
+}
+
+/// First and last disparity of the search range, px.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SearchRange {
+    pub(crate) first: usize,
+    pub(crate) last: usize,
+}
+
+impl SparseMatches {
+    pub(crate) const fn new() -> Self {
+        Self { errors: Vec::new(), searches_left: 0, lower: 0, near: 0 }
+    }
+
+    /// Starts a picture.
+    pub(crate) fn begin(&mut self) {
+        self.errors.clear();
+        self.searches_left = SEARCHES;
+        (self.lower, self.near) = (0, 0);
+    }
+
+    /// Looks along the middle row of `strip`, whose disparities are `row`; `lower` if it lies in the lower half.
+    ///
+    /// # Bound
+    /// Nine steps for every second pixel of the row; for each of [`PLACES`] places `7 x 9` patches of 49 pixels, `3 x` the
+    /// search range in the lower half, and at [`SEARCHES`] places of the picture `9 x` the search range.
+    pub(crate) fn look(
+        &mut self,
+        strip: &Strip<'_, { 2 * MARGIN + 1 }>,
+        row: &[DisparityPixel],
+        range: SearchRange,
+        lower: bool,
+    ) {
+        let span = strip.left_span;
+        let (start, end) = (usize::from(span.start) + RADIUS + 1, usize::from(span.end).min(row.len()));
+        let end = end.saturating_sub(RADIUS + 1);
+        let width = end.saturating_sub(start);
+        for place in 0..PLACES {
+            let part = start + width * place / PLACES..start + width * (place + 1) / PLACES;
+            if let Some(x) = most_contrast(strip, row, part) {
+                self.look_at(strip, x, row.get(x).copied().unwrap_or_default(), range, lower);
+            }
+        }
+    }
+
+    fn look_at(
+        &mut self,
+        strip: &Strip<'_, { 2 * MARGIN + 1 }>,
+        x: usize,
+        pixel: DisparityPixel,
+        range: SearchRange,
+        lower: bool,
+    ) {
+        let known = pixel.has_value().then(|| usize::from((pixel.steps() + 8) >> 4));
+        if lower {
+            let within = match known {
+                Some(disparity) => best_along(strip, x, disparity.saturating_sub(1)..=disparity + 1),
+                None => best_along(strip, x, range.first..=range.last),
+            };
+            let nearer = best_along(strip, x, range.last..=NEARER * range.last);
+            self.lower += 1;
+            self.near += u16::from(nearer.is_some_and(|(cost, _)| within.is_none_or(|(best, _)| 2 * cost < best)));
+        }
+        let disparity = match known {
+            Some(disparity) => disparity,
+            None if self.searches_left > 0 => {
+                self.searches_left -= 1;
+                let rows = (0..=2 * REACH).filter_map(|down| best_at(strip, x, range.first..=range.last, down));
+                let Some((_, disparity)) = rows.min() else { return };
+                disparity
+            }
+            None => return,
+        };
+        if let Some(error) = row_error(strip, x, disparity) {
+            // Cannot fail: there is room for every place.
+            let _ = self.errors.push(error);
+        }
+    }
+
+    /// What the matches of the picture say.
+    ///
+    /// # Bound
+    /// Sorts at most `STRIPS x PLACES` numbers.
+    pub(crate) fn sign(&mut self) -> RowSign {
+        let matches = self.errors.len();
+        for error in &mut self.errors {
+            *error = error.abs();
+        }
+        self.errors.sort_unstable();
+        let middle = self.errors.get(matches / 2).copied().filter(|_| matches >= LEAST_MATCHES).unwrap_or(0);
+        let near_percent = 100.0 * f32::from(self.near) / f32::from(self.lower.max(LEAST_PLACES));
+        RowSign { error_px: f32::from(middle) / 16.0, matches: matches as u16, near_percent }
+    }
+}
+
+/// The place with the most contrast both along and across the row. Whether it has a disparity must not count: where rows are out
+/// of line, those have one that do not show it.
+fn most_contrast(
+    strip: &Strip<'_, { 2 * MARGIN + 1 }>,
+    row: &[DisparityPixel],
+    part: core::ops::Range<usize>,
+) -> Option<usize> {
+    let [above, middle, below] =
+        [MARGIN - 1, MARGIN, MARGIN + 1].map(|y| strip.left.get(y).copied().unwrap_or_default());
+    let mut best = (0, None);
+    for x in part.step_by(2) {
+        let around = |row: &[u8]| -> [u32; 3] {
+            let get = |x: usize| row.get(x).copied().map_or(0, u32::from);
+            [get(x.saturating_sub(1)), get(x), get(x + 1)]
+        };
+        let [a, m, b] = [around(above), around(middle), around(below)];
+        let across: u32 = (0..3).map(|i| a[i].abs_diff(m[i]) + m[i].abs_diff(b[i])).sum();
+        let along: u32 = [a, m, b].iter().map(|r| r[0].abs_diff(r[1]) + r[1].abs_diff(r[2])).sum();
+        let contrast = across.min(along);
+        let Some(pixel) = row.get(x) else { break };
+        let usable = !matches!(pixel.get(), Err(Reason::OutsideValidArea | Reason::Saturated));
+        if usable && contrast >= LEAST_CONTRAST && contrast > best.0 {
+            best = (contrast, Some(x));
+        }
+    }
+    best.1
+}
+
+/// The row in which the right picture shows the patch at `x`, against that of the left, 1/16 px; `None` if that cannot be told.
+fn row_error(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, disparity: usize) -> Option<i16> {
+    let disparities = disparity.saturating_sub(ALONG)..=disparity + ALONG;
+    let mut costs = [u32::MAX; 2 * REACH + 1];
+    for (down, cost) in costs.iter_mut().enumerate() {
+        *cost = best_at(strip, x, disparities.clone(), down)?.0;
+    }
+    let (best, cost) = costs.iter().copied().enumerate().min_by_key(|(_, cost)| *cost)?;
+    let aside = [best.checked_sub(2), best.checked_add(2)].map(|place| place.and_then(|place| costs.get(place)));
+    let rises = aside.into_iter().flatten().all(|&other| other >= cost + LEAST_RISE && 4 * other >= 5 * cost);
+    let above = *costs.get(best.checked_sub(1)?)?;
+    let below = *costs.get(best + 1)?;
+    let fraction = refine(above as i32, cost as i32, below as i32);
+    rises.then_some((best as i32 - REACH as i32) as i16 * 16 + fraction as i16)
+}
+
+/// The least cost along the row itself, and its disparity.
+fn best_along(
+    strip: &Strip<'_, { 2 * MARGIN + 1 }>,
+    x: usize,
+    disparities: core::ops::RangeInclusive<usize>,
+) -> Option<(u32, usize)> {
+    best_at(strip, x, disparities, REACH)
+}
+
+/// The least cost of the patch at `x` of the left picture, `down - REACH` rows lower in the right one, and its disparity.
+fn best_at(
+    strip: &Strip<'_, { 2 * MARGIN + 1 }>,
+    x: usize,
+    disparities: core::ops::RangeInclusive<usize>,
+    down: usize,
+) -> Option<(u32, usize)> {
+    let (first, end) = (usize::from(strip.right_span.start) + RADIUS, usize::from(strip.right_span.end));
+    let mut best: Option<(u32, usize)> = None;
+    for disparity in disparities {
+        let Some(there) = x.checked_sub(disparity).filter(|there| *there >= first) else { break };
+        if there + RADIUS >= end {
+            continue;
+        }
+        let cost = cost(strip, x, there, down);
+        if best.is_none_or(|(least, _)| cost < least) {
+            best = Some((cost, disparity));
+        }
+    }
+    best
+}
+
+/// Sum of the absolute differences of two patches.
+fn cost(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, there: usize, down: usize) -> u32 {
+    let left = strip.left.iter().skip(REACH);
+    let right = strip.right.iter().skip(down);
+    let rows = left.zip(right).take(2 * RADIUS + 1);
+    rows.map(|(left, right)| {
+        let left = left.get(x.saturating_sub(RADIUS)..x + RADIUS + 1).unwrap_or_default();
+        let right = right.get(there.saturating_sub(RADIUS)..there + RADIUS + 1).unwrap_or_default();
+        left.iter().zip(right).map(|(&a, &b)| u32::from(a.abs_diff(b))).sum::<u32>()
+    })
+    .sum()
+}

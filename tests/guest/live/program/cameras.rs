@@ -1,0 +1,121 @@
+//! Cameras that fail: said on the bus in time, and the program recovers by itself.
+
+use std::time::Duration;
+
+use fencepost_core::{health::HealthReason, wire::HeartbeatRepr};
+use fencepost_guest_tests::{
+    bus::Listener,
+    loopback::Loopback,
+    net::Interface,
+    program::Program,
+    say,
+    vivid::{self, Cameras, Controls},
+};
+use fencepost_hal::clock::monotonic_ns;
+
+use super::{
+    Feeder, LOOPBACK, PATIENCE, assert_nothing_free, assert_said_in_time, open_writers, rig, start, wait_for_heartbeat,
+    wait_until_healthy,
+};
+
+/// Small pictures, so that the detector keeps up with the virtual cameras on an emulated machine; of what they show nothing can
+/// be made, so that only the reasons for missing pictures are looked at.
+const VIVID: &str = "left = \"/dev/video0\"\nright = \"/dev/video1\"\nwidth = 320\nheight = 240\npairing_tolerance_ms = 9.0\n\
+    format = \"GREY\"\ntimeout_ms = 60";
+const SETTINGS: &str = "[run]\ndeadline_ms = 10000\nstale_ms = 10000\npriority = 0\nhold_ms = 100\n";
+/// The cameras deliver 60 pictures a second; the detector is slower here, so that the limit is the 100 ms.
+const PERIOD: Duration = Duration::from_millis(17);
+
+fn is_missing(heartbeat: &HeartbeatRepr) -> bool {
+    heartbeat.health.has(HealthReason::MissingPicture)
+}
+
+fn wait_until_seeing(listener: &Listener, program: &Program, since_ns: u64) {
+    wait_for_heartbeat(listener, program, "pictures again", since_ns, |heartbeat| {
+        !is_missing(heartbeat) && heartbeat.last_scan.is_some()
+    });
+}
+
+fn set_both(name: &str, value: i32) {
+    for path in [vivid::LEFT, vivid::RIGHT] {
+        Controls::of(path).set(name, value);
+    }
+}
+
+#[test]
+fn every_fault_that_a_camera_can_be_ordered_to_have_is_said_and_passes() {
+    let bus = Interface::virtual_bus("vcan0");
+    let cameras = Cameras::load();
+    let listener = Listener::open(bus.name());
+    let program = start(&rig(bus.name(), SETTINGS, VIVID));
+    wait_until_seeing(&listener, &program, 0);
+    let faults: [(&str, &dyn Fn(), &dyn Fn()); 6] = [
+        ("damaged buffer", &|| set_both("inject_v4l2_buf_flag_error", 1), &|| ()),
+        ("stall", &|| set_both("percentage_of_dropped_buffers", 100), &|| set_both("percentage_of_dropped_buffers", 0)),
+        ("failure while streaming", &|| set_both("inject_fatal_streaming_error", 1), &|| ()),
+        ("disconnect", &|| Controls::of(vivid::LEFT).set("disconnect", 1), &|| ()),
+        ("unplug", &|| cameras.unplug(), &|| cameras.plug_in()),
+        ("half of the pictures", &|| set_both("percentage_of_dropped_buffers", 50), &|| {
+            set_both("percentage_of_dropped_buffers", 0)
+        }),
+    ];
+    for (name, fault, mend) in faults {
+        let since_ns = monotonic_ns();
+        fault();
+        say!("{name}");
+        let said_ns = assert_said_in_time(&listener, &program, HealthReason::MissingPicture, (since_ns, PERIOD));
+        mend();
+        let mended_ns = monotonic_ns();
+        assert_nothing_free(&listener, said_ns, mended_ns, name);
+        wait_until_seeing(&listener, &program, mended_ns);
+    }
+    for control in ["wrap_sequence_number", "wrap_timestamp"] {
+        set_both(control, 1);
+        wait_until_seeing(&listener, &program, monotonic_ns() + 300_000_000);
+    }
+    program.stop(PATIENCE);
+}
+
+#[test]
+fn a_producer_that_is_killed_is_missed_and_another_one_is_taken() {
+    let bus = Interface::virtual_bus("vcan0");
+    let _loopback = Loopback::load();
+    let listener = Listener::open(bus.name());
+    let period = Duration::from_millis(400);
+    let feeder = Feeder::start(open_writers(), period);
+    let camera = format!("{LOOPBACK}\ntimeout_ms = 600");
+    let program = start(&rig(bus.name(), SETTINGS, &camera));
+    wait_until_healthy(&listener, &program, 0);
+    let since_ns = monotonic_ns();
+    feeder.end();
+    let said_ns = assert_said_in_time(&listener, &program, HealthReason::MissingPicture, (since_ns, period));
+    assert_nothing_free(&listener, said_ns, monotonic_ns(), "producer killed");
+    let feeder = Feeder::start(open_writers(), period);
+    wait_until_healthy(&listener, &program, monotonic_ns());
+    program.stop(PATIENCE);
+    feeder.end();
+}
+
+/// Over and over: nothing is left behind.
+#[test]
+fn a_camera_that_is_pulled_out_fifty_times_costs_nothing() {
+    let bus = Interface::virtual_bus("vcan0");
+    let cameras = Cameras::load();
+    let listener = Listener::open(bus.name());
+    let program = start(&rig(bus.name(), SETTINGS, VIVID));
+    wait_until_seeing(&listener, &program, 0);
+    let mut held = Vec::new();
+    for _ in 0..50 {
+        let since_ns = monotonic_ns();
+        cameras.unplug();
+        wait_for_heartbeat(&listener, &program, "missing", since_ns, is_missing);
+        cameras.plug_in();
+        wait_until_seeing(&listener, &program, monotonic_ns());
+        held.push(program.resources());
+    }
+    let (first, last) = (held[4], held[49]);
+    say!("{first:?} after 5 times, {last:?} after 50");
+    assert_eq!((first.descriptors, first.threads), (last.descriptors, last.threads));
+    assert!(last.resident_kib <= first.resident_kib + 256, "{first:?}, {last:?}");
+    program.stop(PATIENCE);
+}
