@@ -93,9 +93,11 @@ pub fn record<C: Camera>(
         let end = camera_loop.run(camera, &mut observe);
         // The writer ends when it has written what is left.
         drop(camera_loop);
-        let disk = disk.join().unwrap_or_else(|_| Written { frames: 0, error: None });
-        report.written = disk.frames;
-        match disk.error {
+        let Ok(Written { frames, error }) = disk.join() else {
+            return RecordEnd::Disk("the thread that writes has ended".to_string());
+        };
+        report.written = frames;
+        match error {
             Some(error) => RecordEnd::Disk(error.to_string()),
             None => end,
         }
@@ -186,6 +188,8 @@ impl CameraLoop<'_> {
             Offer::Full => self.report.dropped += 1,
             Offer::NotRising => self.report.times_not_rising += 1,
             Offer::WrongSize => self.report.wrong_size += 1,
+            // Why is told by the writer.
+            Offer::Ended => {}
         }
     }
 }

@@ -41,6 +41,8 @@ pub(super) enum Offer {
     Full,
     /// It has another size than the calibration: it is dropped.
     WrongSize,
+    /// The disk's end is gone: there will be no room any more.
+    Ended,
     /// Its time is not after the last one's: it is dropped.
     NotRising,
 }
@@ -69,7 +71,8 @@ impl Filler {
         }
         let mut slot = match self.empty.try_recv() {
             Ok(slot) => slot,
-            Err(TryRecvError::Empty | TryRecvError::Disconnected) => return Offer::Full,
+            Err(TryRecvError::Empty) => return Offer::Full,
+            Err(TryRecvError::Disconnected) => return Offer::Ended,
         };
         copy(&pair.left, &mut slot.left);
         copy(&pair.right, &mut slot.right);
@@ -79,7 +82,7 @@ impl Filler {
         slot.missed = pair.missed;
         match self.filled.try_send(slot) {
             Ok(()) => Offer::Taken,
-            Err(_) => Offer::Full,
+            Err(_) => Offer::Ended,
         }
     }
 }
@@ -149,9 +152,10 @@ mod tests {
     }
 
     #[test]
-    fn a_disk_that_has_given_up_makes_everything_full() {
+    fn a_disk_that_has_given_up_takes_nothing_and_that_is_no_loss_of_its_own() {
         let (mut filler, stored) = queue(3, (2, 2));
         drop(stored);
-        assert_eq!(offer(&mut filler, 1, (2, 2)), Offer::Full);
+        let offers: Vec<Offer> = (0..5).map(|number| offer(&mut filler, number, (2, 2))).collect();
+        assert_eq!(offers, [Offer::Ended; 5]);
     }
 }

@@ -84,14 +84,9 @@ pub fn proposals(devices: &[ListedDevice], most_pixels: u64) -> Vec<CameraSettin
     for (index, left) in devices.iter().enumerate() {
         for right in devices.iter().skip(index + 1) {
             let same_kind = (&left.card, &left.driver) == (&right.card, &right.driver) && !left.card.is_empty();
-            let settings = |mut settings: CameraSettings, format: PixelFormat, rates: &[f32]| {
-                settings.format = Some(format);
-                settings.rate_hz = rate(rates);
-                settings
-            };
             if same_kind && let Some((format, size, rates)) = best(left, Some(right), fits) {
                 let two = CameraSettings::two(left.lasting_name(), right.lasting_name(), size.0, size.1);
-                found.push(settings(two, format, &rates));
+                found.push(with(two, format, &rates));
             }
         }
         // Nobody's single picture is wider than 21 : 9.
@@ -99,13 +94,21 @@ pub fn proposals(devices: &[ListedDevice], most_pixels: u64) -> Vec<CameraSettin
         let high = |(width, height): (u32, u32)| height > width && height % 2 == 0 && fits((width, height / 2));
         if let Some((format, size, rates)) = best_fixed(left, wide) {
             let one = CameraSettings::one(left.lasting_name(), PackedLayout::SideBySide, size.0 / 2, size.1);
-            found.push(CameraSettings { format: Some(format), rate_hz: rate(&rates), ..one });
+            found.push(with(one, format, &rates));
         } else if let Some((format, size, rates)) = best_fixed(left, high) {
             let one = CameraSettings::one(left.lasting_name(), PackedLayout::TopBottom, size.0, size.1 / 2);
-            found.push(CameraSettings { format: Some(format), rate_hz: rate(&rates), ..one });
+            found.push(with(one, format, &rates));
         }
     }
     found
+}
+
+/// With format and rate, and patience for cameras that are slow.
+fn with(settings: CameraSettings, format: PixelFormat, rates_hz: &[f32]) -> CameraSettings {
+    let rate_hz = rate(rates_hz);
+    let three_periods_ms = rate_hz.map_or(0, |rate_hz| (3000.0 / rate_hz.max(0.1)) as u32);
+    let timeout_ms = settings.timeout_ms.max(three_periods_ms);
+    CameraSettings { format: Some(format), rate_hz, timeout_ms, ..settings }
 }
 
 type Choice = (PixelFormat, (u32, u32), Vec<f32>);
@@ -264,6 +267,7 @@ mod tests {
         let expected = CameraSettings {
             format: Some(PixelFormat::Yuyv),
             rate_hz: Some(20.0),
+            timeout_ms: 150,
             ..CameraSettings::two("/dev/v4l/by-id/usb-a", "/dev/camera-right", 800, 600)
         };
         assert_eq!(found, [expected], "not compressed if need not be, by the names that last");

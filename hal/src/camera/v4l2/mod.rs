@@ -206,25 +206,30 @@ impl V4l2Camera {
     /// Says once what the pairing has found odd.
     fn say(&mut self) {
         let counts = self.pairing.counts();
-        let devices = format_args!("{} and {}", self.left.display(), self.right.display()).to_string();
-        let mut say = |first: bool, what: &str| {
-            if first && self.warnings.len() < MOST_WARNINGS {
-                self.warnings.push(format!("{devices}: {what}"));
+        let odd = [
+            (
+                counts.jumps,
+                &mut self.said.jumps,
+                "times of exposure have jumped back; pictures from before and after are never paired",
+            ),
+            (
+                counts.restarts,
+                &mut self.said.restarts,
+                "the numbers of the pictures have begun anew; pictures lost meanwhile cannot be counted",
+            ),
+            (
+                counts.apart,
+                &mut self.said.apart,
+                "their times of exposure are more than a second apart: their clocks do not agree, no pair can be made of them",
+            ),
+        ];
+        for (count, said, what) in odd {
+            // Memory is taken for the first one of a kind only.
+            if count > 0 && *said == 0 && self.warnings.len() < MOST_WARNINGS {
+                self.warnings.push(format!("{} and {}: {what}", self.left.display(), self.right.display()));
             }
-        };
-        say(
-            counts.jumps > 0 && self.said.jumps == 0,
-            "times of exposure have jumped back; pictures from before and after are never paired",
-        );
-        say(
-            counts.restarts > 0 && self.said.restarts == 0,
-            "the numbers of the pictures have begun anew; pictures lost meanwhile cannot be counted",
-        );
-        say(
-            counts.apart > 0 && self.said.apart == 0,
-            "their times of exposure are more than a second apart: their clocks do not agree, no pair can be made of them",
-        );
-        self.said = counts;
+            *said = count;
+        }
     }
 }
 
@@ -247,10 +252,7 @@ impl Camera for V4l2Camera {
                 _ => result,
             }
         });
-        let counts = self.pairing.counts();
-        if (counts.jumps, counts.restarts, counts.apart) != (self.said.jumps, self.said.restarts, self.said.apart) {
-            self.say();
-        }
+        self.say();
         if result.as_ref().is_err_and(|error| error.kind() == CameraErrorKind::Lost) {
             self.close();
         }
