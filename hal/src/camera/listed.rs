@@ -103,12 +103,9 @@ pub fn proposals(devices: &[ListedDevice], most_pixels: u64) -> Vec<CameraSettin
     found
 }
 
-/// With format and rate, and patience for cameras that are slow.
+/// With format and rate.
 fn with(settings: CameraSettings, format: PixelFormat, rates_hz: &[f32]) -> CameraSettings {
-    let rate_hz = rate(rates_hz);
-    let three_periods_ms = rate_hz.map_or(0, |rate_hz| (3000.0 / rate_hz.max(0.1)) as u32);
-    let timeout_ms = settings.timeout_ms.max(three_periods_ms);
-    CameraSettings { format: Some(format), rate_hz, timeout_ms, ..settings }
+    CameraSettings { format: Some(format), rate_hz: rate(rates_hz), ..settings }
 }
 
 type Choice = (PixelFormat, (u32, u32), Vec<f32>);
@@ -267,7 +264,6 @@ mod tests {
         let expected = CameraSettings {
             format: Some(PixelFormat::Yuyv),
             rate_hz: Some(20.0),
-            timeout_ms: 150,
             ..CameraSettings::two("/dev/v4l/by-id/usb-a", "/dev/camera-right", 800, 600)
         };
         assert_eq!(found, [expected], "not compressed if need not be, by the names that last");

@@ -174,12 +174,12 @@ impl CameraSettings {
         range("pairing_tolerance_ms", Some(self.pairing_tolerance_ms.into()), 0.0, 1000.0, " ms");
         range("timeout_ms", self.timeout_ms.map(f64::from), 1.0, 60_000.0, " ms");
         range("exposure_us", self.exposure_us.map(f64::from), 1.0, 10.0e6, " us");
-        if let Some(period_ms) = self.rate_hz.filter(|rate| *rate >= 0.1).map(|rate_hz| 1000.0 / rate_hz)
-            && self.timeout_ms as f32 <= period_ms
+        if let Some(timeout_ms) = self.timeout_ms
+            && let Some(period_ms) = self.rate_hz.filter(|rate| *rate >= 0.1).map(|rate_hz| 1000.0 / rate_hz)
+            && timeout_ms as f32 <= period_ms
         {
             let problem = format!(
-                "is {} ms, and the next picture comes after {period_ms:.0} ms; set it well above that",
-                self.timeout_ms
+                "is {timeout_ms} ms, and the next picture comes after {period_ms:.0} ms; set it well above that"
             );
             mistakes.push(CameraSettingsError { field: "timeout_ms", problem });
         }
@@ -301,7 +301,7 @@ mod tests {
             (format!(r#"{{{two}"rate_hz": 0.0, {size}}}"#), "rate_hz: is 0 Hz"),
             (format!(r#"{{{two}"timeout_ms": 0, {size}}}"#), "timeout_ms: is 0 ms"),
             (
-                format!(r#"{{{two}"rate_hz": 10, {size}}}"#),
+                format!(r#"{{{two}"rate_hz": 10, "timeout_ms": 100, {size}}}"#),
                 "timeout_ms: is 100 ms, and the next picture comes after 100 ms",
             ),
             (format!(r#"{{{two}"pairing_tolerance_ms": -1, {size}}}"#), "pairing_tolerance_ms: is -1 ms"),

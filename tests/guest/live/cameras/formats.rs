@@ -57,7 +57,8 @@ fn one_device_delivers_both_pictures() {
     let _cameras = vivid::Cameras::load();
     show_ramp();
     for layout in [PackedLayout::SideBySide, PackedLayout::TopBottom] {
-        let settings = CameraSettings { timeout_ms: Some(500), ..CameraSettings::one(vivid::LEFT, layout, WIDTH, HEIGHT) };
+        let settings =
+            CameraSettings { timeout_ms: Some(500), ..CameraSettings::one(vivid::LEFT, layout, WIDTH, HEIGHT) };
         let (width, height) = settings.device_size();
         let whole = Reader::open(vivid::LEFT, *b"GREY", width, height).read();
         let mut camera = V4l2Camera::open(&CameraSettings { format: Some(PixelFormat::Grey), ..settings }).unwrap();
