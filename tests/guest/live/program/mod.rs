@@ -7,7 +7,7 @@ mod pictures;
 
 use std::{
     fs,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
@@ -48,7 +48,10 @@ const LOOPBACK: &str =
 
 /// Writes the file of a rig with the mount and the calibration of the committed recording.
 fn rig(interface: &str, sections: &str, camera: &str) -> String {
-    let calibration = trail().join("calib.txt");
+    rig_with(interface, sections, camera, &trail().join("calib.txt"))
+}
+
+fn rig_with(interface: &str, sections: &str, camera: &str, calibration: &Path) -> String {
     let text = format!(
         "[bus]\ninterface = \"{interface}\"\n{sections}\n[[pair]]\ncalibration = [\"{}\"]\n[pair.mount]\nheight_m = 1.1\n\
          pitch_down_deg = 10.0\n[pair.camera]\n{camera}\n",
