@@ -15,19 +15,13 @@ use fencepost_guest_tests::{
 };
 use fencepost_hal::{can::CanFrame, clock::monotonic_ns};
 
-use super::{PATIENCE, assert_said_in_time, rig, start, trail, wait_for_heartbeat, wait_until_healthy};
+use super::{PATIENCE, assert_said_in_time, start, wait_for_heartbeat, wait_until_healthy};
 
 const SETTINGS: &str = "[run]\ndeadline_ms = 10000\nstale_ms = 10000\npriority = 0\nhold_ms = 300\n";
 const PERIOD: Duration = Duration::from_millis(400);
 
-/// Pictures from the committed recording itself: it is the bus that is tried here.
 fn recorded_rig(interface: &str) -> String {
-    let path = rig(interface, SETTINGS, "left = \"a\"\nright = \"b\"\nwidth = 320\nheight = 240");
-    let text = std::fs::read_to_string(&path).unwrap();
-    let (bus, _) = text.split_once("[[pair]]").unwrap();
-    let pair = format!("[[pair]]\n[pair.recording]\npath = \"{}\"\nrepeat = true\nrate_hz = 2.5\n", trail().display());
-    std::fs::write(&path, format!("{bus}{pair}")).unwrap();
-    path
+    super::recorded_rig(interface, SETTINGS, true)
 }
 
 /// The bus cannot carry the news while it is down: it hears them as soon as it is back.

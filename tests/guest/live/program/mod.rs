@@ -62,6 +62,18 @@ fn rig_with(interface: &str, sections: &str, camera: &str, calibration: &Path) -
     path.to_string()
 }
 
+/// A rig that plays the committed recording without any camera: where it is the bus that is tried.
+fn recorded_rig(interface: &str, sections: &str, repeat: bool) -> String {
+    let path = "/tmp/recorded_rig.toml";
+    let text = format!(
+        "[bus]\ninterface = \"{interface}\"\n{sections}\n[[pair]]\n[pair.recording]\npath = \"{}\"\nrepeat = {repeat}\n\
+         rate_hz = 2.5\n",
+        trail().display()
+    );
+    fs::write(path, text).unwrap();
+    path.to_string()
+}
+
 fn start(rig: &str) -> Program {
     Program::start(&format!("run --config {rig} -v"))
 }

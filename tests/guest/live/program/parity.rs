@@ -1,10 +1,15 @@
 //! A recording played through real devices gives the bus what `replay` writes for it.
 
-use std::{fs, time::Duration};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    time::Duration,
+};
 
 use fencepost_core::wire::{Address, Message};
 use fencepost_guest_tests::{
-    bus::Listener,
+    bus::{Listener, wait_for_reader},
     loopback::Loopback,
     machine::{on_first_processor, run, wait_for},
     net::{ControllerPair, Interface},
@@ -135,4 +140,27 @@ fn a_controller_hears_what_replay_writes() {
 fn a_controller_with_can_fd_hears_what_replay_writes() {
     let pair = ControllerPair::fd();
     compare(pair.a.name(), pair.b.name(), true);
+}
+
+/// What candump writes of the bus is kept for cantools, which tests/run lets decode it and compare it with the cells.
+#[test]
+fn candump_writes_what_is_on_the_bus() {
+    let target = PathBuf::from(std::env::var_os("FENCEPOST_PROGRAM").expect("set by tests/guest/run"));
+    let kept = target.parent().and_then(Path::parent).expect("the program is in a folder of the target").join("tmp");
+    let bus = Interface::virtual_bus("vcan0");
+    let log = fs::File::create(kept.join("guest_candump.log")).unwrap();
+    let mut candump = Command::new("candump").args(["-L", "-T", "20000", bus.name()]).stdout(log).spawn().unwrap();
+    wait_for_reader(bus.name());
+    let program = start(&super::recorded_rig(bus.name(), PATIENT, false));
+    let ended = program.wait(Duration::from_secs(60));
+    assert!(ended.status.success(), "{}", ended.said);
+    std::thread::sleep(Duration::from_secs(1));
+    candump.kill().unwrap();
+    candump.wait().unwrap();
+
+    let out = "/tmp/replayed_for_candump";
+    let replay = Program::start(&format!("replay {} --out {out} --write cells", trail().display()));
+    let ended = replay.wait(Duration::from_secs(60));
+    assert!(ended.status.success(), "{}", ended.said);
+    fs::copy(format!("{out}/cells.csv"), kept.join("guest_candump.csv")).unwrap();
 }
