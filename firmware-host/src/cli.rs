@@ -30,6 +30,10 @@ Examples:
       report.html
   fencepost replay garden --out out --frames 100..200 --write cells,can
       Only frames 100 to 199, only the tables and the CAN log
+  fencepost cameras
+      The cameras that are plugged in, and the lines of a rig's file for them
+  fencepost record --config rig.toml --out ~/recordings/yard --seconds 60
+      What the cameras of a rig see, as a recording to replay
   fencepost can decode out/garden/can.log
       The messages of a CAN log as text
   fencepost listen can0
