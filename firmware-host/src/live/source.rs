@@ -16,7 +16,7 @@ use crate::{
 #[derive(Debug)]
 pub enum RigCamera {
     /// Real cameras.
-    #[cfg(feature = "v4l")]
+    #[cfg(all(feature = "v4l", target_os = "linux"))]
     V4l2(Box<fencepost_hal::camera::v4l2::V4l2Camera>),
     /// A recording, played as if it were live.
     Recording(Box<PlayedRecording>),
@@ -35,7 +35,7 @@ pub struct PlayedRecording {
 #[derive(Debug)]
 pub enum RigCameraError {
     /// A real camera.
-    #[cfg(feature = "v4l")]
+    #[cfg(all(feature = "v4l", target_os = "linux"))]
     V4l2(fencepost_hal::camera::v4l2::V4l2Error),
     /// A recording.
     Recording(RecordingError),
@@ -64,7 +64,7 @@ impl RigCamera {
     }
 }
 
-#[cfg(feature = "v4l")]
+#[cfg(all(feature = "v4l", target_os = "linux"))]
 fn open_camera(settings: &fencepost_hal::camera::CameraSettings) -> Result<RigCamera, Failure> {
     use fencepost_hal::camera::v4l2::V4l2Camera;
 
@@ -77,13 +77,13 @@ fn open_camera(settings: &fencepost_hal::camera::CameraSettings) -> Result<RigCa
     Ok(RigCamera::V4l2(Box::new(camera)))
 }
 
-#[cfg(not(feature = "v4l"))]
+#[cfg(not(all(feature = "v4l", target_os = "linux")))]
 fn open_camera(_: &fencepost_hal::camera::CameraSettings) -> Result<RigCamera, Failure> {
     Err(no_v4l())
 }
 
 /// What to do where the program was built without real cameras.
-#[cfg(not(feature = "v4l"))]
+#[cfg(not(all(feature = "v4l", target_os = "linux")))]
 pub(crate) fn no_v4l() -> Failure {
     Failure::usage("this program was built without V4L2 cameras").mend(
         "on Debian: apt install libclang-dev linux-libc-dev, then cargo build --release --features v4l (docs/deploy.md)",
@@ -94,7 +94,7 @@ impl RigCamera {
     /// What was odd when the cameras were opened.
     pub fn take_warnings(&mut self) -> Vec<String> {
         match self {
-            #[cfg(feature = "v4l")]
+            #[cfg(all(feature = "v4l", target_os = "linux"))]
             Self::V4l2(camera) => camera.take_warnings(),
             Self::Recording(_) | Self::Scene(_) => Vec::new(),
         }
@@ -106,7 +106,7 @@ impl Camera for RigCamera {
 
     fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, RigCameraError> {
         match self {
-            #[cfg(feature = "v4l")]
+            #[cfg(all(feature = "v4l", target_os = "linux"))]
             Self::V4l2(camera) => camera.next_pair(consume).map_err(RigCameraError::V4l2),
             Self::Recording(played) => {
                 let recorded = played.camera.inner_mut();
@@ -125,7 +125,7 @@ impl Camera for RigCamera {
 impl CameraError for RigCameraError {
     fn kind(&self) -> CameraErrorKind {
         match self {
-            #[cfg(feature = "v4l")]
+            #[cfg(all(feature = "v4l", target_os = "linux"))]
             Self::V4l2(error) => error.kind(),
             Self::Recording(error) => error.kind(),
         }
@@ -135,7 +135,7 @@ impl CameraError for RigCameraError {
 impl fmt::Display for RigCameraError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            #[cfg(feature = "v4l")]
+            #[cfg(all(feature = "v4l", target_os = "linux"))]
             Self::V4l2(error) => error.fmt(f),
             Self::Recording(error) => error.fmt(f),
         }

@@ -95,17 +95,22 @@ impl Listener {
         let end = Arc::new(AtomicBool::new(false));
         // Before the thread begins, so that nothing is missed that is sent from now on.
         let mut socket = open_socket(interface).unwrap_or_else(|error| panic!("{interface}: {error}"));
+        let mut number = number_of(interface);
         let (interface, thread_heard, thread_end) = (interface.to_owned(), Arc::clone(&heard), Arc::clone(&end));
         let ear = thread::spawn(move || {
             while !thread_end.load(Ordering::Relaxed) {
                 match socket.read_frame() {
                     Ok(frame) => lock(&thread_heard).take(&frame, monotonic_ns()),
-                    Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {}
+                    // An interface that was deleted and made again is another one, of which this socket hears nothing.
+                    Err(error)
+                        if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
+                            && number_of(&interface) == number => {}
                     // Down, or gone: listens again as soon as there is something to listen to.
                     Err(_) => {
                         thread::sleep(LOOK_AGAIN);
+                        let found = number_of(&interface);
                         if let Ok(again) = open_socket(&interface) {
-                            socket = again;
+                            (socket, number) = (again, found);
                         }
                     }
                 }
@@ -238,6 +243,11 @@ pub fn wait_for_reader(interface: &str) {
         readers.lines().any(|line| line.split_whitespace().next() == Some(interface)).then_some(())
     });
     assert!(found.is_some(), "nobody listens on {interface}");
+}
+
+/// The kernel's number of an interface, if it is there.
+fn number_of(interface: &str) -> Option<String> {
+    fs::read_to_string(format!("/sys/class/net/{interface}/ifindex")).ok()
 }
 
 fn open_socket(interface: &str) -> io::Result<CanFdSocket> {

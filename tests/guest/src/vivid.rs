@@ -57,7 +57,7 @@ impl Cameras {
     pub fn plug_in(&self) {
         write_sys(&Path::new(DRIVER).join("bind"), "vivid.0");
         assert!(
-            wait_for(Duration::from_secs(5), || are_there().then_some(())).is_some(),
+            wait_for(Duration::from_secs(20), || are_there().then_some(())).is_some(),
             "the cameras did not come back"
         );
     }

@@ -47,6 +47,8 @@ pub struct V4l2Camera {
     open: Option<Open>,
     opened_before: bool,
     retry_ns: u64,
+    /// Since when the next pair is waited for.
+    waiting_since_ns: Option<u64>,
     pairing: Pairing<Frame>,
     said: PairingCounts,
     warnings: Vec<String>,
@@ -98,6 +100,7 @@ impl V4l2Camera {
             open: None,
             opened_before: false,
             retry_ns: 0,
+            waiting_since_ns: None,
             pairing: Pairing::new(settings.pairing_tolerance_ns()),
             said: PairingCounts::default(),
             warnings: Vec::new(),
@@ -141,6 +144,16 @@ impl V4l2Camera {
             self.open = Some(open);
         }
         self.open.as_mut().ok_or_else(|| V4l2Error::new(&self.left, V4l2Problem::NotBack))
+    }
+
+    /// Until when the next pair must have come: counted from the pair before, whatever the caller did with it meanwhile. Those
+    /// that have come in that time are taken nevertheless.
+    fn deadline_ns(&self) -> u64 {
+        const LEAST_NS: u64 = 5_000_000;
+        let now_ns = monotonic_ns();
+        let timeout_ns = 1_000_000 * u64::from(self.settings.timeout_ms());
+        let since_ns = self.waiting_since_ns.unwrap_or(now_ns);
+        since_ns.saturating_add(timeout_ns).max(now_ns.saturating_add(LEAST_NS.min(timeout_ns)))
     }
 
     /// Opens the devices if they are closed, no sooner than is sensible and no later than `deadline_ns`.
@@ -237,9 +250,11 @@ impl Camera for V4l2Camera {
     type Error = V4l2Error;
 
     fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, Self::Error> {
-        let deadline_ns = monotonic_ns().saturating_add(1_000_000 * u64::from(self.settings.timeout_ms()));
+        let deadline_ns = self.deadline_ns();
         self.ready(deadline_ns)?;
-        let result = self.wait_for_pair(deadline_ns).and_then(|pair| {
+        let pair = self.wait_for_pair(deadline_ns);
+        self.waiting_since_ns = Some(monotonic_ns());
+        let result = pair.and_then(|pair| {
             let not_back = || V4l2Error::new(&self.left, V4l2Problem::NotBack);
             let open = self.open.as_mut().ok_or_else(not_back)?;
             let result = open.lend(&pair, self.layout, consume);

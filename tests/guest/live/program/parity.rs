@@ -88,7 +88,7 @@ fn live(sender: &str, receiver: &str, fd: bool) -> (usize, Vec<(u32, Vec<u8>)>) 
     let mut writers = open_writers();
     write_nothing(&mut writers);
     let wire = if fd { "[wire]\nformat = \"fd\"\nmax_cell_frames = 80\n" } else { "" };
-    let camera = format!("{LOOPBACK}\ntimeout_ms = 20000\nnewest_only = false");
+    let camera = format!("{LOOPBACK}\ntimeout_ms = 4000\nnewest_only = false");
     let program = start(&rig(sender, &format!("{PATIENT}{wire}"), &camera));
     // It says that it is there, and then perhaps what it sees in the pair that was written first.
     let there = wait_for(PATIENCE, || (!listener.heard().frames.is_empty()).then_some(()));
