@@ -43,6 +43,8 @@ const FRAMES: usize = 255 + FIXED_FRAMES_PER_SCAN;
 const HEARTBEAT_NS: u64 = 1_000_000_000 / HEARTBEAT_RATE_HZ as u64;
 /// News are said at once, but not more often than this.
 const NEWS_NS: u64 = 10_000_000;
+/// A queue that is full for so long is too slow: the largest scan of the default settings takes 56 ms at 500 kbit/s.
+const LONG_FULL_NS: u64 = 80_000_000;
 /// How often is looked for frames of others, and for room in a full queue.
 const LISTEN: Duration = Duration::from_millis(5);
 const RETRY: Duration = Duration::from_millis(1);
@@ -101,6 +103,7 @@ pub(super) struct BusLoop<'a, B: CanBus> {
     pairs: [PairState; MAX_PAIRS],
     condition: BusCondition,
     bus_trouble: Option<BusErrorKind>,
+    full_since_ns: Option<u64>,
     status: Status,
     said: Health,
     /// What the newest scan said of itself.
@@ -156,6 +159,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             pairs: [PairState::default(); MAX_PAIRS],
             condition: BusCondition::default(),
             bus_trouble: None,
+            full_since_ns: None,
             status,
             said: status.health,
             scan_health: Health::default(),
@@ -354,10 +358,18 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         let now_ns = monotonic_ns();
         let pump = self.transmitter.pump(now_ns);
         match pump.trouble {
-            // Full is nothing to worry about as long as the scan is through before the next one.
-            None | Some(BusErrorKind::Full) => {
-                if pump.sent > 0 && pump.trouble.is_none() {
+            None => {
+                self.full_since_ns = None;
+                if pump.sent > 0 {
                     self.bus_good(now_ns);
+                }
+            }
+            // The queue of the kernel is short, and full whenever a scan goes out. That is nothing to worry about as long as it
+            // does go out.
+            Some(BusErrorKind::Full) => {
+                let since_ns = *self.full_since_ns.get_or_insert(now_ns);
+                if now_ns.saturating_sub(since_ns) > LONG_FULL_NS {
+                    self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
                 }
             }
             Some(kind) => {

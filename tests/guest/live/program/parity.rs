@@ -11,7 +11,7 @@ use fencepost_core::wire::{Address, Message};
 use fencepost_guest_tests::{
     bus::{Listener, wait_for_reader},
     loopback::Loopback,
-    machine::{on_first_processor, run, wait_for},
+    machine::{on_first_processor, wait_for},
     net::{ControllerPair, Interface},
     program::Program,
     say,
@@ -51,7 +51,10 @@ fn timeless(frames: impl IntoIterator<Item = CanFrame>) -> Vec<(u32, Vec<u8>)> {
 /// What `replay` writes for the recording, behind `grey` pairs of nothing.
 fn replayed(grey: usize, fd: bool) -> Vec<(u32, Vec<u8>)> {
     let (folder, out) = ("/tmp/behind_grey", "/tmp/replayed");
-    run(&format!("rm -rf {folder} {out}"));
+    for old in [folder, out] {
+        // It is there only if another test made it.
+        let _ = fs::remove_dir_all(old);
+    }
     let recording = Recording::open(trail()).unwrap();
     let mut writer = RecordingWriter::create(folder, &recording.calibration.stereo, &recording.mount).unwrap();
     let pixels = vec![128; (super::SIZE.0 * super::SIZE.1) as usize];
