@@ -79,6 +79,7 @@ fn run(frames: u32, planted: bool) -> Stats {
         mount: options.mount(),
         settings,
         cpu: None,
+        patience: std::time::Duration::from_secs(30),
     };
     let bus = VirtualBus::new(4000);
     let (node, mut listener) = (bus.attach(), bus.attach());

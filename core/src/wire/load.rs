@@ -12,6 +12,9 @@ pub const FIXED_FRAMES_PER_SCAN: usize = 3 + SectorsRepr::PARTS as usize;
 /// Heartbeats of a node in a second.
 pub const HEARTBEAT_RATE_HZ: u32 = 10;
 
+/// Most heartbeats in a second: those that tell at once what has changed come besides, but never closer than 50 ms.
+pub const MAX_HEARTBEAT_RATE_HZ: u32 = 20;
+
 /// Vehicle motion messages in a second that the load reckons with.
 pub const VEHICLE_MOTION_RATE_HZ: u32 = 50;
 
@@ -55,7 +58,7 @@ pub const fn max_bits_per_scan(config: &WireConfig) -> u32 {
 /// the vehicle's motion at [`VEHICLE_MOTION_RATE_HZ`].
 pub const fn max_bits_per_second(config: &WireConfig, scan_rate_hz: u16) -> u32 {
     let scans = scan_rate_hz as u32;
-    let others = HEARTBEAT_RATE_HZ + VEHICLE_MOTION_RATE_HZ + scans;
+    let others = MAX_HEARTBEAT_RATE_HZ + VEHICLE_MOTION_RATE_HZ + scans;
     scans.saturating_mul(max_bits_per_scan(config)).saturating_add(others * classic_frame_bits(8))
 }
 

@@ -187,7 +187,8 @@ fn check_rig(text: &mut String, config: &Config, console: &mut Console) -> Resul
         },
     );
     let wire = WireConfig::new(config.wire).map_err(|error| Failure::config(error, config.file.as_deref()))?;
-    let rate_hz = pairs.iter().map(|pair| pair.source.rate_hz()).fold(0.0, f32::max).ceil() as u16;
+    // Pairs that are not triggered together make a scan each.
+    let rate_hz = pairs.iter().map(|pair| pair.source.rate_hz()).sum::<f32>().ceil() as u16;
     let permille = max_load_permille(&wire, bus.bitrate, rate_hz);
     line(
         text,

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use fencepost_core::wire::WireConfig;
+use fencepost_core::wire::{FrameFormat, Message, WireConfig};
 use fencepost_hal::can::{IdFilter, SocketCan, VirtualBus};
 
 use super::Ending;
@@ -24,6 +24,8 @@ use crate::{
     words,
 };
 
+/// A thread that has not moved for so long after the longest wait for its camera hangs: opening devices may take seconds.
+const HANGS: Duration = Duration::from_secs(10);
 /// How often systemd and whoever watches are told how it goes.
 const STATUS: Duration = Duration::from_secs(2);
 
@@ -65,6 +67,7 @@ fn plan(config: &Config, wire: WireConfig, console: &mut Console) -> Result<Plan
             mount: pair.mount,
             settings: config.settings_for(pair.picture_size().0),
             cpu: pair.cpu,
+            patience: pair.source.longest_wait() + HANGS,
         });
     }
     let sector_width_deg = config.settings_for(0).map.sector_width_deg;
@@ -83,11 +86,11 @@ fn start(
     if rig.bus.interface == BusSettings::NONE {
         return live::run(plan, VirtualBus::new(0).attach(), stop, |observation| watcher.observe(&observation));
     }
-    let fd = wire.format() == fencepost_core::wire::FrameFormat::Fd;
+    let fd = wire.format() == FrameFormat::Fd;
     let address = wire.address();
-    // All that a node has to hear are the two messages of its controller.
-    let commands = [fencepost_core::wire::Message::VehicleMotion, fencepost_core::wire::Message::ScanEcho];
-    let filters = commands.map(|message| IdFilter::exactly(address.id(message)));
+    // All that a node has to hear are the two messages of its controller, and whether somebody else has its number.
+    let heard = [Message::VehicleMotion, Message::ScanEcho, Message::Heartbeat];
+    let filters = heard.map(|message| IdFilter::exactly(address.id(message)));
     let mut bus = SocketCan::new(&rig.bus.interface, fd).with_filters(&filters);
     if let Err(error) = bus.open_now() {
         watcher.console.warn(format_args!("{error}; the program goes on and waits for it"));
@@ -103,8 +106,7 @@ struct Watcher<'a> {
     end: Option<Duration>,
     start: Instant,
     last_status: Option<(Instant, u64)>,
-    last_alive: Instant,
-    hung: bool,
+    alive: bool,
 }
 
 impl<'a> Watcher<'a> {
@@ -116,8 +118,7 @@ impl<'a> Watcher<'a> {
             end: args.seconds.map(Duration::from_secs_f64),
             start: Instant::now(),
             last_status: None,
-            last_alive: Instant::now(),
-            hung: false,
+            alive: true,
         }
     }
 
@@ -126,7 +127,6 @@ impl<'a> Watcher<'a> {
             Observation::Refused(text) => self.console.warn(text),
             Observation::Started => {
                 self.start = Instant::now();
-                self.last_alive = self.start;
                 self.systemd.ready();
                 self.console.note("running");
             }
@@ -147,20 +147,15 @@ impl<'a> Watcher<'a> {
             self.systemd.stopping();
             return;
         }
-        if alive {
-            self.last_alive = now;
-        }
-        // Half of systemd's patience: a thread that has not moved for longer does not come back, and systemd is to start the
-        // program anew.
-        let patience = self.systemd.watchdog().map_or(Duration::from_secs(5), |watchdog| watchdog / 2);
-        let hung = now - self.last_alive > patience;
-        if hung && !self.hung {
+        if !alive && self.alive {
             self.console.error("a thread of the loop hangs");
         }
-        self.hung = hung;
-        if !hung && self.last_status.is_none_or(|(at, _)| now - at >= STATUS.min(patience)) {
+        self.alive = alive;
+        // Systemd that watches is told twice in the time that it waits. When it hears nothing more, it starts the program anew.
+        let often = self.systemd.watchdog().map_or(STATUS, |watchdog| STATUS.min(watchdog / 2));
+        if alive && self.last_status.is_none_or(|(at, _)| now - at >= often) {
             let (before, scans) = self.last_status.unwrap_or((self.start, 0));
-            let rate = (progress.scans - scans) as f64 / (now - before).as_secs_f64().max(1.0e-3);
+            let rate = progress.scans.saturating_sub(scans) as f64 / (now - before).as_secs_f64().max(1.0e-3);
             let status = status_line(progress, rate);
             self.systemd.alive(&status);
             self.console.note(&status);

@@ -143,7 +143,7 @@ impl Config {
             map: section!("map", MapSettings, |map: &MapSettings| map.check(detector::CELLS)).unwrap_or_default(),
             health: section!("health", HealthSettings, HealthSettings::check).unwrap_or_default(),
         };
-        let mount = section!("mount", Mount, Mount::check);
+        let mount: Option<Mount> = section!("mount", Mount, Mount::check);
         let wire = section!("wire", WireSettings, |wire: &WireSettings| WireConfig::new(*wire).map(|_| ()))
             .unwrap_or_default();
         let chose_disparities = reader.section(&root, "matching").is_some_and(|section| section.has("disparities"));
@@ -156,7 +156,7 @@ impl Config {
             file: None,
         };
         if with_rig {
-            config.rig = rig::read(&mut reader, &root, folder, |width| config.settings_for(width));
+            config.rig = rig::read(&mut reader, &root, folder, (mount, |width| config.settings_for(width)));
         }
         (config, reader.mistakes)
     }

@@ -1,6 +1,9 @@
 //! The part of a configuration file that is a rig: `[bus]`, `[run]` and a `[[pair]]` for each pair of cameras.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use fencepost_core::{
     error::{ConfigError, ConfigProblem},
@@ -119,6 +122,7 @@ struct PairSettings {
     cpu: Option<u16>,
 }
 
+const MOUNT_UNKNOWN: &str = "the mount is not known: height is taken as 1 m, tilt as level; add [pair.mount]";
 const PAIR_SECTIONS: [&str; 4] = ["mount", "camera", "recording", "scene"];
 
 /// Reads the rig of a file in `folder`, the files that it names among it. Notes every mistake.
@@ -126,7 +130,7 @@ pub(super) fn read<'a>(
     reader: &mut Reader<'a>,
     root: &Section<'a>,
     folder: &Path,
-    settings_for: impl Fn(u32) -> Settings,
+    (mount, settings_for): (Option<Mount>, impl Fn(u32) -> Settings),
 ) -> Rig {
     let bus = reader.section(root, "bus").and_then(|section| {
         reader.settings(&section, &[], |bus: &BusSettings| {
@@ -137,6 +141,9 @@ pub(super) fn read<'a>(
         reader.settings(&section, &[], |run: &RunSettings| run.check().err().map(Refused::of).into_iter().collect())
     });
     let sections = reader.sections(root, "pair");
+    if sections.len() > 1 && root.has("mount") {
+        reader.note_at(root, "mount", "does not say of which pair it is", "write [pair.mount] below each [[pair]]");
+    }
     if sections.len() > MAX_PAIRS {
         let line = reader.line(&sections[MAX_PAIRS].span);
         reader.note(
@@ -148,7 +155,19 @@ pub(super) fn read<'a>(
     }
     let mut pairs: Vec<RigPair> = Vec::new();
     for (index, section) in sections.iter().enumerate() {
-        if let Some(pair) = read_pair(reader, section, folder, index, &settings_for) {
+        if sections.len() > 1 && !section.has("mount") {
+            let mend = "add [pair.mount] with `forward_m`, `left_m` and `yaw_left_deg`: otherwise all pairs are taken to look ahead";
+            reader.note_at(section, "mount", "is missing, and there is more than one pair", mend);
+        }
+        if let Some(mut pair) = read_pair(reader, section, folder, index, &settings_for) {
+            if let Some(mount) = mount.filter(|_| !section.has("mount") && sections.len() == 1) {
+                pair.mount = mount;
+                pair.warnings.retain(|warning| warning != MOUNT_UNKNOWN);
+            }
+            if pairs.iter().any(|other| other.mount == pair.mount) {
+                let mend = "say where each stands and looks: `forward_m`, `left_m`, `yaw_left_deg`";
+                reader.note_at(section, "mount", "is that of another pair too", mend);
+            }
             if pairs.iter().any(|other| other.name == pair.name) {
                 reader.note_at(
                     section,
@@ -359,6 +378,16 @@ impl RigPair {
 }
 
 impl RigSource {
+    /// Longest time that the camera may take for a pair.
+    pub fn longest_wait(&self) -> Duration {
+        match self {
+            Self::Camera(camera) => Duration::from_millis(camera.timeout_ms().into()),
+            Self::Recording(_) | Self::Scene(_) => {
+                Duration::from_secs_f32(1.0 / self.rate_hz()).max(Duration::from_secs(1))
+            }
+        }
+    }
+
     /// Pairs of pictures a second; 30 where only the camera knows.
     pub fn rate_hz(&self) -> f32 {
         const USUAL_HZ: f32 = 30.0;

@@ -2,13 +2,16 @@
 
 use std::{
     fmt::{self, Write as _},
-    sync::{Mutex, PoisonError},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use heapless::{Deque, String};
 
 /// Longest text of an event, bytes. What is longer is cut off.
-const TEXT_BYTES: usize = 400;
+const TEXT_BYTES: usize = 600;
 /// Events that wait to be said. Those that find no room are counted.
 const WAITING: usize = 64;
 
@@ -35,13 +38,8 @@ pub enum Severity {
 /// The events that wait to be said.
 #[derive(Debug, Default)]
 pub(super) struct Events {
-    waiting: Mutex<Waiting>,
-}
-
-#[derive(Debug, Default)]
-struct Waiting {
-    events: Deque<Event, WAITING>,
-    dropped: u64,
+    waiting: Mutex<Deque<Event, WAITING>>,
+    dropped: AtomicU64,
 }
 
 impl Events {
@@ -49,20 +47,22 @@ impl Events {
     pub(super) fn tell(&self, at_ns: u64, severity: Severity, text: fmt::Arguments<'_>) {
         let mut event = Event { at_ns, severity, text: String::new() };
         let _ = write!(Cutter(&mut event.text), "{text}");
-        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        if waiting.events.push_back(event).is_err() {
-            waiting.dropped += 1;
+        // The main thread holds the table for a moment at a time, but may be held up itself meanwhile: a thread of the loop does
+        // not wait for it.
+        let kept = self.waiting.try_lock().is_ok_and(|mut waiting| waiting.push_back(event).is_ok());
+        if !kept {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
     /// The event that waits longest.
     pub(super) fn next(&self) -> Option<Event> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).events.pop_front()
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
     }
 
     /// Events that were dropped so far.
     pub(super) fn dropped(&self) -> u64 {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).dropped
+        self.dropped.load(Ordering::Relaxed)
     }
 }
 

@@ -18,7 +18,7 @@ use crate::detector::{CELLS, OBSTACLES};
 pub(super) struct Newest {
     /// Counts the detections; 0 before the first.
     pub(super) published: u64,
-    /// Exposure of the pictures, nanoseconds of the monotonic clock.
+    /// Exposure of the pictures, nanoseconds of the monotonic clock; never later than now, whatever the camera says.
     pub(super) exposure_ns: u64,
     /// Pictures that were lost before these.
     pub(super) missed: u32,
@@ -58,10 +58,11 @@ impl Place {
         self.newest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn publish(&self, exposure_ns: u64, missed: u32, detection: &Detection<OBSTACLES, CELLS>) {
+    pub(super) fn publish(&self, exposure_ns: u64, missed: u32, now_ns: u64, detection: &Detection<OBSTACLES, CELLS>) {
         let mut newest = self.lock();
         newest.published += 1;
-        newest.exposure_ns = exposure_ns;
+        // A time of exposure that lies ahead would make the data young for ever.
+        newest.exposure_ns = exposure_ns.min(now_ns);
         newest.missed = missed;
         newest.trouble = None;
         copy(&mut newest.detection, detection);
@@ -70,6 +71,11 @@ impl Place {
     /// Says what has gone wrong. What was seen before stays, and ages.
     pub(super) fn fail(&self, trouble: Trouble) {
         self.lock().trouble = Some(trouble);
+    }
+
+    /// Whether its camera has nothing more to deliver.
+    pub(super) fn has_ended(&self) -> bool {
+        self.lock().trouble == Some(Trouble::Ended)
     }
 
     pub(super) fn count_alive(&self) {

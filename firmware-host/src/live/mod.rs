@@ -42,7 +42,7 @@ use std::{
         mpsc,
     },
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use fencepost_core::{geometry::StereoCalibration, wire::WireConfig};
@@ -81,11 +81,11 @@ pub enum Observation<'a> {
     Started,
     /// Something happened.
     Event(&'a Event),
-    /// How it goes; `alive` tells whether every thread has moved since the last time.
+    /// How it goes; `alive` tells whether no thread has stood still for longer than it may.
     Look {
         /// What the bus thread last said.
         progress: Progress,
-        /// Whether every thread has moved.
+        /// Whether every thread moves.
         alive: bool,
     },
 }
@@ -124,6 +124,7 @@ where
     {
         observe(Observation::Refused(&refused));
     }
+    let patience: Vec<Duration> = pairs.iter().map(|pair| pair.patience).collect();
     let places: Vec<Place> = pairs.iter().map(|_| Place::new()).collect();
     let names: Vec<String> = pairs.iter().map(|pair| pair.name.clone()).collect();
     let (bell, events, progress, bus_alive) = (Bell::default(), Events::default(), Mutex::default(), AtomicU64::new(0));
@@ -161,7 +162,8 @@ where
             }));
         }
         let bus_thread = {
-            let wishes = ThreadWishes { cpu: settings.bus_cpu, priority: settings.priority };
+            // Before the detectors: a heartbeat must not wait for a picture. A FIFO thread is not interrupted by its equals.
+            let wishes = ThreadWishes { cpu: settings.bus_cpu, priority: settings.bus_priority() };
             let (ready, start, called_off) = (ready_sender, &start, &called_off);
             scope.spawn(move || {
                 let _ = ready.send(Ok(wishes.ask()));
@@ -192,39 +194,81 @@ where
             return Err(failure);
         }
         observe(Observation::Started);
-        let mut liveness = Liveness::default();
+        let mut liveness = Liveness::new(places.iter().map(|place| &place.alive).zip(patience), &bus_alive);
+        let mut broken = None;
         while !bus_thread.is_finished() {
             thread::sleep(LOOK);
             while let Some(event) = events.next() {
                 observe(Observation::Event(&event));
             }
-            let ended = |index: usize| pair_threads.get(index).is_some_and(|thread| thread.is_finished());
-            let alive = liveness.look(places.iter().map(|place| &place.alive).chain([&bus_alive]), ended);
+            // A thread that ends while its camera goes on has met a mistake of the program.
+            let dead =
+                pair_threads.iter().zip(&places).position(|(thread, place)| thread.is_finished() && !place.has_ended());
+            if let Some(index) = dead.filter(|_| !stop.load(Ordering::Relaxed)) {
+                broken = Some(index);
+                stop.store(true, Ordering::Relaxed);
+            }
             let progress = progress.lock().map(|progress| *progress).unwrap_or_default();
-            observe(Observation::Look { progress, alive });
+            observe(Observation::Look { progress, alive: liveness.look(|index| places[index].has_ended()) });
         }
-        let bus = bus_thread.join().ok().flatten().unwrap_or_default();
-        let pairs = pair_threads.into_iter().filter_map(|thread| thread.join().ok()).collect();
+        // Also where the bus thread met a mistake of the program: nobody works for a bus that hears nothing.
+        stop.store(true, Ordering::Relaxed);
+        let bus = bus_thread.join();
+        let pairs: Vec<_> = pair_threads.into_iter().map(thread::ScopedJoinHandle::join).collect();
         while let Some(event) = events.next() {
             observe(Observation::Event(&event));
         }
+        let whole = |what: &str| {
+            Failure::work(format!("the thread of {what} has ended by a mistake of the program"))
+                .mend("start it again, and report what it printed")
+        };
+        if let Some(index) = broken {
+            return Err(whole(&format!("pair {}", names[index])));
+        }
+        let bus = bus.ok().flatten().ok_or_else(|| whole("the bus"))?;
+        let pairs = pairs.into_iter().collect::<Result<_, _>>().map_err(|_| whole("a pair"))?;
         Ok(RunReport { pairs, bus, events_dropped: events.dropped() })
     })
 }
 
-/// The counts of the threads when they were last looked at.
-#[derive(Debug, Default)]
-struct Liveness([u64; MAX_PAIRS + 1]);
+/// When each thread was last seen to move.
+#[derive(Debug)]
+struct Liveness<'a> {
+    pairs: Vec<Pulse<'a>>,
+    bus: Pulse<'a>,
+}
 
-impl Liveness {
-    /// Whether every count has risen since the last look. A thread that has ended need not.
-    fn look<'a>(&mut self, counts: impl Iterator<Item = &'a AtomicU64>, ended: impl Fn(usize) -> bool) -> bool {
-        let mut all = true;
-        for (index, (count, before)) in counts.zip(&mut self.0).enumerate() {
-            let now = count.load(Ordering::Relaxed);
-            all &= std::mem::replace(before, now) != now || ended(index);
+#[derive(Debug)]
+struct Pulse<'a> {
+    count: &'a AtomicU64,
+    before: u64,
+    moved: Instant,
+    patience: Duration,
+}
+
+/// The bus thread waits for nothing longer than a few milliseconds.
+const BUS_PATIENCE: Duration = Duration::from_secs(1);
+
+impl<'a> Liveness<'a> {
+    fn new(pairs: impl Iterator<Item = (&'a AtomicU64, Duration)>, bus: &'a AtomicU64) -> Self {
+        let pulse = |(count, patience)| Pulse { count, before: 0, moved: Instant::now(), patience };
+        Self { pairs: pairs.map(pulse).collect(), bus: pulse((bus, BUS_PATIENCE)) }
+    }
+
+    /// Whether no thread has stood still for longer than it may. One that has ended in order need not move.
+    fn look(&mut self, ended: impl Fn(usize) -> bool) -> bool {
+        let bus = self.bus.is_alive();
+        self.pairs.iter_mut().enumerate().fold(bus, |all, (index, pulse)| (pulse.is_alive() || ended(index)) && all)
+    }
+}
+
+impl Pulse<'_> {
+    fn is_alive(&mut self) -> bool {
+        let now = self.count.load(Ordering::Relaxed);
+        if std::mem::replace(&mut self.before, now) != now {
+            self.moved = Instant::now();
         }
-        all
+        self.moved.elapsed() <= self.patience
     }
 }
 

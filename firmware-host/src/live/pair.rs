@@ -44,6 +44,8 @@ pub struct PairPlan<C> {
     pub settings: Settings,
     /// Processor of the thread; any if `None`.
     pub cpu: Option<u16>,
+    /// No call of the camera and the detector takes longer; a thread that has not moved for so long hangs.
+    pub patience: Duration,
 }
 
 /// What became of a pair's pictures.
@@ -91,7 +93,7 @@ impl<C: Camera> PairLoop<'_, C> {
                 delivery.record(start_ns.saturating_sub(pair.timestamp_ns));
                 look(pair, detector)?;
                 detect.record(monotonic_ns().saturating_sub(start_ns));
-                place.publish(pair.timestamp_ns, pair.missed, detector.detection());
+                place.publish(pair.timestamp_ns, pair.missed, monotonic_ns(), detector.detection());
                 Ok(pair.missed)
             });
             place.count_alive();

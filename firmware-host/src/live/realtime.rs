@@ -21,13 +21,16 @@ impl ThreadWishes {
     }
 }
 
-/// Whether there is such a processor.
+/// Whether the machine has such a processor. Those that are kept free of other work (`isolcpus`) count, though the program is
+/// not on them yet.
 ///
 /// # Errors
 /// Named `field`.
 pub(crate) fn check_cpu(field: &'static str, cpu: u16) -> Result<(), ConfigError> {
-    let last = std::thread::available_parallelism().map_or(0, |count| count.get() - 1);
-    ConfigError::check(field, f32::from(cpu), 0.0, last as f32)
+    // As `0-3`, or `0,2-3`: the last number is the highest.
+    let possible = std::fs::read_to_string("/sys/devices/system/cpu/possible").ok();
+    let last = possible.and_then(|text| text.trim().rsplit(['-', ',']).next()?.parse::<u16>().ok());
+    last.map_or(Ok(()), |last| ConfigError::check(field, f32::from(cpu), 0.0, f32::from(last)))
 }
 
 #[cfg(target_os = "linux")]

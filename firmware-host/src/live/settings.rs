@@ -3,6 +3,8 @@
 use fencepost_core::error::ConfigError;
 use serde::{Deserialize, Serialize};
 
+use super::realtime::check_cpu;
+
 /// Most pairs of cameras in a rig.
 pub const MAX_PAIRS: usize = 4;
 
@@ -24,7 +26,8 @@ pub struct RunSettings {
     pub echo_timeout_ms: u32,
     /// Whether a controller that was never heard is missing.
     pub controller_required: bool,
-    /// Real-time priority (`SCHED_FIFO`) of the threads of the loop, 1 to 99; 0 for none.
+    /// Real-time priority (`SCHED_FIFO`) of the pairs' threads, 1 to 98; 0 for none. The bus thread has
+    /// one more.
     pub priority: u8,
     /// Whether memory is locked.
     pub lock_memory: bool,
@@ -50,6 +53,11 @@ impl Default for RunSettings {
 }
 
 impl RunSettings {
+    /// Priority of the bus thread: above that of the pairs' threads.
+    pub(super) const fn bus_priority(&self) -> u8 {
+        if self.priority == 0 { 0 } else { self.priority.saturating_add(1) }
+    }
+
     /// Checks every value.
     ///
     /// # Errors
@@ -61,7 +69,8 @@ impl RunSettings {
         ConfigError::check("run.merge_wait_ms", self.merge_wait_ms as f32, 0.0, 1000.0)?;
         ConfigError::check("run.command_timeout_ms", self.command_timeout_ms as f32, 1.0, 60_000.0)?;
         ConfigError::check("run.echo_timeout_ms", self.echo_timeout_ms as f32, 1.0, 60_000.0)?;
-        ConfigError::check("run.priority", f32::from(self.priority), 0.0, 99.0)
+        ConfigError::check("run.priority", f32::from(self.priority), 0.0, 98.0)?;
+        self.bus_cpu.map_or(Ok(()), |cpu| check_cpu("run.bus_cpu", cpu))
     }
 }
 

@@ -2,41 +2,38 @@
 
 use fencepost_core::health::{Health, HealthLevel, HealthReason};
 
+/// Levels that a reason may have, from ok to fault.
+const LEVELS: [HealthLevel; 4] = [HealthLevel::Ok, HealthLevel::Degraded, HealthLevel::Blind, HealthLevel::Fault];
+
 /// What was seen lately. A reason is said at once, and for some time after it was last seen, so that what comes and goes is
-/// said without a break.
+/// said without a break. Each level is held by itself: a milder case neither hides a worse one nor keeps it alive.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Watch {
     hold_ns: u64,
-    seen: [Option<Seen>; HealthReason::ALL.len()],
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Seen {
-    at_ns: u64,
-    level: HealthLevel,
+    /// When each reason was last seen with each level.
+    seen_ns: [[Option<u64>; LEVELS.len()]; HealthReason::ALL.len()],
 }
 
 impl Watch {
     pub(super) const fn new(hold_ns: u64) -> Self {
-        Self { hold_ns, seen: [None; HealthReason::ALL.len()] }
+        Self { hold_ns, seen_ns: [[None; LEVELS.len()]; HealthReason::ALL.len()] }
     }
 
     /// The reason is there now.
     pub(super) fn see(&mut self, reason: HealthReason, level: HealthLevel, now_ns: u64) {
-        if let Some(seen) = self.seen.get_mut(reason as usize) {
-            // A milder case does not make a worse one that is still held look milder.
-            let held = seen.filter(|seen| now_ns.saturating_sub(seen.at_ns) <= self.hold_ns);
-            let level = held.map_or(level, |held| level.max(held.level));
-            *seen = Some(Seen { at_ns: now_ns, level });
+        if let Some(seen_ns) = self.seen_ns.get_mut(reason as usize).and_then(|levels| levels.get_mut(level as usize)) {
+            *seen_ns = Some(now_ns);
         }
     }
 
-    /// The reasons of now.
+    /// The reasons of now, each with the worst level that is held.
     pub(super) fn health(&self, now_ns: u64) -> Health {
+        let held =
+            |seen_ns: &Option<u64>| seen_ns.is_some_and(|seen_ns| now_ns.saturating_sub(seen_ns) <= self.hold_ns);
         let mut health = Health::OK;
-        for (reason, seen) in HealthReason::ALL.into_iter().zip(self.seen) {
-            if let Some(seen) = seen.filter(|seen| now_ns.saturating_sub(seen.at_ns) <= self.hold_ns) {
-                health.raise(reason, seen.level);
+        for (reason, levels) in HealthReason::ALL.into_iter().zip(&self.seen_ns) {
+            for (level, _) in LEVELS.into_iter().zip(levels).filter(|(_, seen_ns)| held(seen_ns)) {
+                health.raise(reason, level);
             }
         }
         health
@@ -48,6 +45,9 @@ pub(super) fn joined(a: Health, b: Health) -> Health {
     Health { level: a.level.max(b.level), reasons: a.reasons | b.reasons }
 }
 
+/// Scans whose time of sending is known. More are not sent within any sensible time-out.
+const SENT: usize = 128;
+
 /// Whether the controller at the other end takes scans over.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EchoWatch {
@@ -55,6 +55,8 @@ pub(super) struct EchoWatch {
     /// Whether there must be a controller. Once one was heard, there must.
     expected: bool,
     newest_sent: Option<u16>,
+    /// When the last scans were sent, by their index modulo the length.
+    sent_ns: [u64; SENT],
     newest_echo: Option<u16>,
     /// Since when scans wait for an echo.
     waiting_since_ns: Option<u64>,
@@ -62,25 +64,29 @@ pub(super) struct EchoWatch {
 
 impl EchoWatch {
     pub(super) const fn new(timeout_ns: u64, expected: bool) -> Self {
-        Self { timeout_ns, expected, newest_sent: None, newest_echo: None, waiting_since_ns: None }
+        let (newest_sent, newest_echo, waiting_since_ns) = (None, None, None);
+        Self { timeout_ns, expected, newest_sent, sent_ns: [0; SENT], newest_echo, waiting_since_ns }
     }
 
     /// The last frame of a scan was sent.
     pub(super) fn sent(&mut self, scan_index: u16, now_ns: u64) {
         self.newest_sent = Some(scan_index);
+        self.sent_ns[usize::from(scan_index) % SENT] = now_ns;
         self.waiting_since_ns.get_or_insert(now_ns);
     }
 
-    /// An echo came. Only one that is newer than the one before is a sign of life: a controller that hangs repeats itself.
+    /// An echo came. Only that of a scan which was sent lately is a sign of life, and only once: a controller that hangs repeats
+    /// itself.
     pub(super) fn echo(&mut self, scan_index: u16, now_ns: u64) {
         self.expected = true;
-        let newer = self.newest_echo.is_none_or(|before| (1..0x8000).contains(&scan_index.wrapping_sub(before)));
-        let behind = self.newest_sent.map(|sent| sent.wrapping_sub(scan_index));
-        // What was not sent cannot have been taken over.
-        let possible = behind.is_some_and(|behind| behind < 0x8000);
-        if newer && possible {
+        let Some(newest) = self.newest_sent else { return };
+        let behind = newest.wrapping_sub(scan_index);
+        let sent_ns = self.sent_ns[usize::from(scan_index) % SENT];
+        let lately = usize::from(behind) < SENT && now_ns.saturating_sub(sent_ns) <= self.timeout_ns;
+        // The newest one is good however long ago it was sent: there may have been none since.
+        if self.newest_echo != Some(scan_index) && (behind == 0 || lately) {
             self.newest_echo = Some(scan_index);
-            self.waiting_since_ns = if behind == Some(0) { None } else { Some(now_ns) };
+            self.waiting_since_ns = if behind == 0 { None } else { Some(now_ns) };
         }
     }
 
@@ -110,6 +116,18 @@ mod tests {
     }
 
     #[test]
+    fn a_milder_case_that_goes_on_does_not_keep_a_worse_one_alive() {
+        let mut watch = Watch::new(100);
+        watch.see(HealthReason::MissingPicture, HealthLevel::Fault, 0);
+        for now_ns in (0..1000).step_by(10) {
+            watch.see(HealthReason::MissingPicture, HealthLevel::Degraded, now_ns);
+        }
+        assert_eq!(watch.health(100).level, HealthLevel::Fault);
+        assert_eq!(watch.health(101).level, HealthLevel::Degraded);
+        assert_eq!(watch.health(1000).level, HealthLevel::Degraded);
+    }
+
+    #[test]
     fn an_echo_is_missing_when_scans_go_out_and_none_is_taken_over() {
         let mut watch = EchoWatch::new(100, false);
         watch.sent(65534, 0);
@@ -128,6 +146,15 @@ mod tests {
         assert!(watch.is_missing(5203), "7 was never sent");
         watch.echo(0, 5203);
         assert!(!watch.is_missing(9000));
+        // Silent for so many scans that the index has gone round half its way: the next echo counts nevertheless.
+        for scan in 1..=40_000 {
+            watch.sent(scan, 10_000 + u64::from(scan));
+        }
+        assert!(watch.is_missing(60_000));
+        watch.echo(39_800, 60_000);
+        assert!(watch.is_missing(60_000), "that one was sent too long ago");
+        watch.echo(40_000, 60_000);
+        assert!(!watch.is_missing(60_000));
         let mut required = EchoWatch::new(100, true);
         required.sent(0, 0);
         assert!(required.is_missing(101));

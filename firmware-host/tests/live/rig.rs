@@ -106,7 +106,15 @@ pub(crate) struct Running {
 pub(crate) fn pair<C>(name: &str, camera: C, options: &SceneOptions, mount: Mount) -> PairPlan<C> {
     let mut settings = Settings::default();
     settings.matching.disparities = 32;
-    PairPlan { name: name.to_string(), camera, calibration: options.calibration(), mount, settings, cpu: None }
+    PairPlan {
+        name: name.to_string(),
+        camera,
+        calibration: options.calibration(),
+        mount,
+        settings,
+        cpu: None,
+        patience: std::time::Duration::from_secs(30),
+    }
 }
 
 /// Settings under which nothing but what a test does makes a frame late or stale, on a machine that has other work.

@@ -84,9 +84,23 @@ impl<B: CanBus> BusLoop<'_, B> {
                     self.shared.events.tell(now_ns, Severity::Warning, format_args!("bus: {error}"));
                 }
                 None => {
-                    self.shared.events.tell(now_ns, Severity::Warning, format_args!("bus: nothing can be sent"));
+                    self.shared.events.tell(
+                        now_ns,
+                        Severity::Warning,
+                        format_args!("bus: nothing can be sent; look at the cable"),
+                    );
                 }
             }
+        }
+    }
+
+    /// Somebody else sends under the number of this node: receivers get two sources of cells in one.
+    pub(super) fn other_node(&mut self, now_ns: u64) {
+        self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
+        if !std::mem::replace(&mut self.other_node_told, true) {
+            let text =
+                format_args!("bus: another node has the same number; give each computer its own `node` in [wire]");
+            self.shared.events.tell(now_ns, Severity::Warning, text);
         }
     }
 

@@ -19,7 +19,7 @@ use fencepost_core::{
     map::Merged,
     wire::{
         CellsRepr, Command, CommandReceiver, CommandStatistics, FIXED_FRAMES_PER_SCAN, Frame, HEARTBEAT_RATE_HZ,
-        NodeState, Scan, ScanEncoder, Status, WireConfig,
+        MAX_HEARTBEAT_RATE_HZ, Message, NodeState, Scan, ScanEncoder, Status, WireConfig,
     },
 };
 use fencepost_hal::{
@@ -42,7 +42,7 @@ const RUNS: usize = 255 * CellsRepr::FD_RUNS;
 const FRAMES: usize = 255 + FIXED_FRAMES_PER_SCAN;
 const HEARTBEAT_NS: u64 = 1_000_000_000 / HEARTBEAT_RATE_HZ as u64;
 /// News are said at once, but not more often than this.
-const NEWS_NS: u64 = 10_000_000;
+const NEWS_NS: u64 = 1_000_000_000 / MAX_HEARTBEAT_RATE_HZ as u64;
 /// A queue that is full for so long is too slow: the largest scan of the default settings takes 56 ms at 500 kbit/s.
 const LONG_FULL_NS: u64 = 80_000_000;
 /// How often is looked for frames of others, and for room in a full queue.
@@ -104,6 +104,8 @@ pub(super) struct BusLoop<'a, B: CanBus> {
     condition: BusCondition,
     bus_trouble: Option<BusErrorKind>,
     full_since_ns: Option<u64>,
+    /// Whether another node with the same number was told of.
+    other_node_told: bool,
     status: Status,
     said: Health,
     /// What the newest scan said of itself.
@@ -132,6 +134,7 @@ struct PairState {
 struct InFlight {
     scan_index: u16,
     exposure_ns: u64,
+    begun_ns: u64,
 }
 
 impl<'a, B: CanBus> BusLoop<'a, B> {
@@ -160,6 +163,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             condition: BusCondition::default(),
             bus_trouble: None,
             full_since_ns: None,
+            other_node_told: false,
             status,
             said: status.health,
             scan_health: Health::default(),
@@ -183,7 +187,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             self.listen(now_ns);
             self.collect(now_ns);
             let waiting = self.wait_for_others(now_ns);
-            if self.first_fresh_ns.is_some() && waiting.is_none() {
+            if self.first_fresh_ns.is_some() && waiting.is_none() && !self.is_busy(now_ns) {
                 self.scan(now_ns);
             }
             self.judge(now_ns);
@@ -212,12 +216,17 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         for _ in 0..LISTEN_FRAMES {
             match self.transmitter.receive() {
                 Ok(None) => break,
-                Ok(Some((_, frame))) => {
+                Ok(Some((arrived_ns, frame))) => {
                     let Id::Standard(id) = frame.id() else { continue };
-                    // What is wrong with a message is in the statistics.
-                    match self.commands.receive(id, frame.data(), now_ns) {
+                    if self.encoder.config().address().message(id) == Some(Message::Heartbeat) {
+                        self.other_node(now_ns);
+                        continue;
+                    }
+                    // What waited is as old as it is. What is wrong with a message is in the statistics.
+                    let arrived_ns = arrived_ns.min(now_ns);
+                    match self.commands.receive(id, frame.data(), arrived_ns) {
                         Ok(Command::VehicleMotion(_)) => self.motion_heard = true,
-                        Ok(Command::ScanEcho(echo)) => self.echo.echo(echo.scan_index, now_ns),
+                        Ok(Command::ScanEcho(echo)) => self.echo.echo(echo.scan_index, arrived_ns),
                         Ok(Command::NotOurs | Command::Repeated) | Err(_) => {}
                     }
                 }
@@ -257,14 +266,21 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         (left > 0 && self.pairs().any(waits)).then(|| Duration::from_nanos(left))
     }
 
+    /// Whether a scan is on its way that may still come in time. If each new one cut off the one before, a bus that is a little
+    /// too slow would never carry a whole one.
+    fn is_busy(&self, now_ns: u64) -> bool {
+        self.in_flight.is_some_and(|flight| now_ns.saturating_sub(flight.begun_ns) < self.deadline_ns())
+    }
+
     /// Joins what the pairs saw and hands it to the transmitter.
     fn scan(&mut self, now_ns: u64) {
         self.first_fresh_ns = None;
         let stale_ns = u64::from(self.settings.stale_ms) * 1_000_000;
         self.merged.clear();
         let mut oldest_ns: Option<u64> = None;
+        let mut oldest_fresh_ns: Option<u64> = None;
         for (pair, place) in self.pairs.iter_mut().zip(self.shared.places) {
-            pair.fresh = false;
+            let fresh = std::mem::take(&mut pair.fresh);
             let newest = place.lock();
             let mut health = Health::default();
             // What a pair saw before it got into trouble is not mixed with what the others see now.
@@ -275,17 +291,20 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
                 }
                 // The pairs of a rig have the same settings, and so the same cells.
                 None if self.merged.add(&newest.detection).is_ok() => {
-                    oldest_ns = Some(oldest_ns.map_or(newest.exposure_ns, |oldest| oldest.min(newest.exposure_ns)));
+                    let older =
+                        |known: Option<u64>| Some(known.map_or(newest.exposure_ns, |k| k.min(newest.exposure_ns)));
+                    oldest_ns = older(oldest_ns);
+                    oldest_fresh_ns = if fresh { older(oldest_fresh_ns) } else { oldest_fresh_ns };
                     continue;
                 }
                 None => {}
             }
             self.merged.add_health(health);
         }
-        let Some(exposure_ns) = oldest_ns else { return };
-
-        let age_ns = now_ns.saturating_sub(exposure_ns);
-        if age_ns > self.deadline_ns() {
+        // The age is that of the oldest pictures in the map; late are only those that are new in it.
+        let (Some(oldest_ns), Some(exposure_ns)) = (oldest_ns, oldest_fresh_ns) else { return };
+        let age_ns = now_ns.saturating_sub(oldest_ns);
+        if now_ns.saturating_sub(exposure_ns) > self.deadline_ns() {
             self.watch.see(HealthReason::Late, HealthLevel::Degraded, now_ns);
         }
         let (seen, map, sectors) =
@@ -315,7 +334,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
         }
         if self.transmitter.scan(&self.frames).is_ok() {
-            self.in_flight = Some(InFlight { scan_index, exposure_ns });
+            self.in_flight = Some(InFlight { scan_index, exposure_ns, begun_ns: now_ns });
         }
         let first = self.status.last_scan.is_none();
         self.status.state = NodeState::Running;
@@ -324,7 +343,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             // A receiver takes no scan from a node that is not running: it hears at once that this one is.
             self.next_heartbeat_ns = now_ns;
         }
-        if let Ok(mut progress) = self.shared.progress.lock() {
+        if let Ok(mut progress) = self.shared.progress.try_lock() {
             progress.age_ms = age_ns as f64 * 1.0e-6;
         }
     }
@@ -358,12 +377,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         let now_ns = monotonic_ns();
         let pump = self.transmitter.pump(now_ns);
         match pump.trouble {
-            None => {
-                self.full_since_ns = None;
-                if pump.sent > 0 {
-                    self.bus_good(now_ns);
-                }
-            }
+            None => self.full_since_ns = None,
             // The queue of the kernel is short, and full whenever a scan goes out. That is nothing to worry about as long as it
             // does go out.
             Some(BusErrorKind::Full) => {
@@ -381,6 +395,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             && flight.scan_index == finished
         {
             self.in_flight = None;
+            self.bus_good(now_ns);
             self.echo.sent(finished, now_ns);
             let latency_ns = now_ns.saturating_sub(flight.exposure_ns);
             self.latency.record(latency_ns);
