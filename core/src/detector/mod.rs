@@ -144,8 +144,7 @@ impl<
         self.map.configure(&settings.map, (settings.obstacles.min_height_m, settings.obstacles.clearance_m))?;
         settings.health.check()?;
         self.health = settings.health;
-        self.content.clear();
-        self.exposures = None;
+        self.forget_pictures();
         self.debounce = Debounce::new(settings.health.trigger_frames, settings.health.release_frames);
         // The last disparity has no neighbour to interpolate with and is never reported.
         let largest = f32::from(min_disparity) + f32::from(disparities) - 2.0;
@@ -162,6 +161,30 @@ impl<
             sector_width_deg: settings.map.sector_width_deg,
         });
         Ok(())
+    }
+
+    /// Forgets all that was seen in earlier frames, as [`Self::configure`] does, and keeps what is configured.
+    ///
+    /// To be called when pictures did not come for long: a ground plane that is held, or a picture that came again, says
+    /// something about the frame before only if there is one frame's time between them. The next frame is found to be what it
+    /// would be after [`Self::configure`]. What is told of the cameras is not forgotten: a reason that was told goes on being
+    /// told until [`HealthSettings::release_frames`] frames in a row have not found it, because a gap is no sign that its cause
+    /// is gone; those frames, and those that a new reason must be found in, are counted anew.
+    ///
+    /// # Bound
+    /// The clearing of counts and lengths; no buffer is gone through.
+    pub fn forget(&mut self) {
+        self.ground.forget();
+        self.forget_pictures();
+        self.debounce.interrupt();
+        self.detection.clear();
+    }
+
+    /// Forgets the pictures that new ones are compared with.
+    fn forget_pictures(&mut self) {
+        self.content.clear();
+        self.content_signs = ContentSigns::UNSET;
+        self.exposures = None;
     }
 
     /// Looks at a pair of pictures. `probe` is told which stage runs.

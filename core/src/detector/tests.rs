@@ -8,6 +8,7 @@ use crate::{
     error::ConfigProblem,
     geometry::{CameraModel, Distortion, RawPair, Rectification},
     ground::GroundSettings,
+    health::{Health, HealthLevel, HealthReason},
     map::{MapGeometry, MapSettings},
     test_random::Random,
 };
@@ -168,6 +169,80 @@ fn garbage_never_panics_and_leaves_nothing_behind() {
             assert_eq!(anew(&good), alone, "round {round}: the frame before has no say");
         }
     }
+}
+
+#[test]
+fn what_is_forgotten_has_no_say_in_the_next_frame() {
+    let settings = Settings { ground: GroundSettings::default(), ..settings() };
+    assert!(settings.ground.hold_frames > 0);
+    let fresh = || {
+        let mut detector = Box::new(Small::new());
+        detector.configure(&settings, &StereoCalibration::Rectified(PAIR), &MOUNT).unwrap();
+        detector
+    };
+    // Without what is told of the cameras, and what that takes away: reasons of before go on being told.
+    let found = |detector: &mut Small, frame: &(Vec<u8>, Vec<u8>), blind: bool| {
+        look(detector, frame);
+        let mut detection = detector.detection().clone();
+        detection.health = Health::OK;
+        if blind {
+            detection.map.withhold_free();
+            detection.statistics.cells_free = 0;
+            detection.sectors = SectorDistances::of(&detection.map, settings.map.sector_width_deg);
+        }
+        let pixels: Vec<u16> = detector.disparity().pixels().iter().map(|pixel| pixel.bits()).collect();
+        std::format!("{detection:?} {pixels:?} {:?} {:?}", detector.surfaces().table(), detector.content())
+    };
+    let (good, other) = (good_pair(8), good_pair(9));
+    let flat = (vec![90; WIDTH * HEIGHT], vec![90; WIDTH * HEIGHT]);
+    let mut random = Random::seeded("forgetting", 0x5eed_0162);
+    let mut detector = fresh();
+    for round in 0..8 {
+        let noise = garbage(&mut random);
+        // The last frame before has most to say: held ground, the same picture again, another scene, garbage.
+        for before in [[&noise, &good], [&good, &flat], [&flat, &other], [&good, &noise]] {
+            for next in [&good, &flat, &noise] {
+                detector.configure(&settings, &StereoCalibration::Rectified(PAIR), &MOUNT).unwrap();
+                before.into_iter().for_each(|frame| drop(look(&mut detector, frame)));
+                let told = detector.detection().health;
+                detector.forget();
+                assert!(detector.detection().map.cells.is_empty() && detector.detection().ground.is_none());
+                let mut alone = fresh();
+                let blind = told.level >= HealthLevel::Blind;
+                let expected = found(&mut alone, next, blind);
+                assert!(found(&mut detector, next, false) == expected, "round {round}: the frames before have a say");
+                let (now, alone) = (detector.detection().health, alone.detection().health);
+                assert_eq!(now.reasons & !told.reasons, alone.reasons & !told.reasons, "round {round}: nothing new");
+                assert_eq!(now.reasons & told.reasons, told.reasons, "round {round}: what was told is still told");
+            }
+        }
+        if round == 0 {
+            // It is the forgetting that does it.
+            detector.configure(&settings, &StereoCalibration::Rectified(PAIR), &MOUNT).unwrap();
+            let expected = found(&mut fresh(), &flat, false);
+            look(&mut detector, &good);
+            assert!(found(&mut detector, &flat, false) != expected, "the ground is held");
+        }
+    }
+}
+
+#[test]
+fn what_is_told_is_released_by_count_after_forgetting() {
+    let mut detector = configured();
+    let good = good_pair(10);
+    let dark = (vec![0; WIDTH * HEIGHT], vec![0; WIDTH * HEIGHT]);
+    let mut is_dark = |frame: &(Vec<u8>, Vec<u8>), forget: bool| {
+        if forget {
+            detector.forget();
+        }
+        look(&mut detector, frame);
+        detector.detection().health.has(HealthReason::Underexposed)
+    };
+    assert!((0..3).all(|_| is_dark(&dark, false)));
+    assert!((0..4).all(|_| is_dark(&good, false)));
+    // Four of five frames without it have come, but not in a row with the next.
+    let told: Vec<bool> = (0..6).map(|frame| is_dark(&good, frame == 0)).collect();
+    assert_eq!(told, [true, true, true, true, false, false]);
 }
 
 #[test]

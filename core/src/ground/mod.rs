@@ -77,8 +77,13 @@ impl GroundFinder {
         let max_tilt = settings.max_tilt_deg.to_radians();
         self.max_slope = libm::tanf(max_tilt);
         self.least_upright = libm::cosf(max_tilt);
-        self.last = None;
+        self.forget();
         Ok(())
+    }
+
+    /// Forgets the ground of earlier frames.
+    pub const fn forget(&mut self) {
+        self.last = None;
     }
 
     /// Finds the ground, or holds that of an earlier frame, and gives the surfaces on it their class.

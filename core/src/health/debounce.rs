@@ -91,6 +91,12 @@ impl Debounce {
         self.told.health()
     }
 
+    /// Begins every count anew: the next update does not follow on those before. What is told goes on being told.
+    pub const fn interrupt(&mut self) {
+        self.found_for = [0; REASONS];
+        self.milder_for = [0; REASONS];
+    }
+
     /// What is being told.
     pub fn told(&self) -> Health {
         self.told.health()
