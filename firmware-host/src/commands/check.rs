@@ -200,6 +200,15 @@ fn check_rig(text: &mut String, config: &Config, console: &mut Console) -> Resul
             bus.bitrate / 1000,
         ),
     );
+    for pair in pairs {
+        let period_ms = 1000.0 / pair.source.rate_hz();
+        if (run.stale_ms as f32) < 2.0 * period_ms {
+            console.warn(format_args!(
+                "pair {}: a picture comes every {period_ms:.0} ms, and is stale after {} ms; set run.stale_ms to twice that",
+                pair.name, run.stale_ms
+            ));
+        }
+    }
     if permille > 1000 {
         console.warn(
             "the largest scans do not fit on the bus at this rate: some will be abandoned; lower wire.max_cell_frames, or \

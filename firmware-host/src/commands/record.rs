@@ -40,7 +40,7 @@ pub fn record_rig(args: &RecordArgs, console: &mut Console) -> Result<Ending, Fa
     for warning in &pair.warnings {
         console.warn(format_args!("pair {}: {warning}", pair.name));
     }
-    let mut camera = RigCamera::open(&pair)?;
+    let mut camera = RigCamera::open(&pair, true)?;
     for warning in camera.take_warnings() {
         console.warn(format_args!("pair {}: {warning}", pair.name));
     }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use fencepost_core::wire::{FrameFormat, Message, WireConfig};
-use fencepost_hal::can::{IdFilter, SocketCan, VirtualBus};
+use fencepost_hal::can::{CanInterface, IdFilter, SocketCan, VirtualBus};
 
 use super::Ending;
 use crate::{
@@ -58,7 +58,7 @@ fn plan(config: &Config, wire: WireConfig, console: &mut Console) -> Result<Plan
     for pair in &config.rig.pairs {
         console.note(format_args!("pair {}: {}", pair.name, pair.source.describe()));
         pair.warnings.iter().for_each(|warning| console.warn(format_args!("pair {}: {warning}", pair.name)));
-        let mut camera = RigCamera::open(pair)?;
+        let mut camera = RigCamera::open(pair, config.rig.pairs.len() == 1)?;
         camera.take_warnings().iter().for_each(|warning| console.warn(format_args!("pair {}: {warning}", pair.name)));
         pairs.push(PairPlan {
             name: pair.name.clone(),
@@ -95,7 +95,33 @@ fn start(
     if let Err(error) = bus.open_now() {
         watcher.console.warn(format_args!("{error}; the program goes on and waits for it"));
     }
+    if let Ok(interface) = CanInterface::look(&rig.bus.interface) {
+        odd_about(&interface, fd, rig.bus.bitrate).iter().for_each(|text| watcher.console.warn(text));
+    }
     live::run(plan, bus, stop, |observation| watcher.observe(&observation))
+}
+
+/// What does not go together with the rig.
+fn odd_about(interface: &CanInterface, fd: bool, bitrate: u32) -> Vec<String> {
+    let name = &interface.name;
+    let mut odd = Vec::new();
+    if fd && !interface.takes_fd() {
+        odd.push(format!(
+            "{name} takes no CAN FD frames, but wire.format is \"fd\": no scan will go out; set it up with `fd on` and a \
+             dbitrate, or set wire.format to \"classic\""
+        ));
+    }
+    if let Some(timing) = &interface.timing
+        && timing.bitrate != bitrate
+    {
+        odd.push(format!("{name} runs at {} bit/s, bus.bitrate says {bitrate}: set them alike", timing.bitrate));
+    }
+    if interface.restart_ms == Some(0) {
+        odd.push(format!(
+            "{name} stays away for ever once it had to leave the bus (bus-off): `ip link set {name} type can restart-ms 100`"
+        ));
+    }
+    odd
 }
 
 /// Tells people and systemd how it goes.

@@ -125,6 +125,7 @@ where
         observe(Observation::Refused(&refused));
     }
     let patience: Vec<Duration> = pairs.iter().map(|pair| pair.patience).collect();
+    let forget_ns = u64::from(settings.stale_ms) * 1_000_000;
     let places: Vec<Place> = pairs.iter().map(|_| Place::new()).collect();
     let names: Vec<String> = pairs.iter().map(|pair| pair.name.clone()).collect();
     let (bell, events, progress, bus_alive) = (Bell::default(), Events::default(), Mutex::default(), AtomicU64::new(0));
@@ -158,7 +159,7 @@ where
                 if called_off.load(Ordering::Relaxed) {
                     return PairReport::default();
                 }
-                PairLoop { name, camera, place, bell, events, stop }.run(&mut detector)
+                PairLoop { name, camera, place, bell, events, stop, forget_ns }.run(&mut detector)
             }));
         }
         let bus_thread = {

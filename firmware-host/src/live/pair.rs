@@ -77,6 +77,8 @@ pub(super) struct PairLoop<'a, C> {
     pub(super) bell: &'a Bell,
     pub(super) events: &'a Events,
     pub(super) stop: &'a AtomicBool,
+    /// Pictures farther apart than this have nothing to do with each other.
+    pub(super) forget_ns: u64,
 }
 
 impl<C: Camera> PairLoop<'_, C> {
@@ -85,12 +87,19 @@ impl<C: Camera> PairLoop<'_, C> {
         let mut report = PairReport { name: self.name.to_string(), ..PairReport::default() };
         let (mut delivery, mut detect) = (Latency::new(), Latency::new());
         let mut trouble: Option<(Trouble, u64)> = None;
+        let mut last_exposure_ns = None;
         let (place, bell) = (self.place, self.bell);
         while !self.stop.load(Ordering::Relaxed) {
             let called = Instant::now();
             let result = self.camera.next_pair(|pair| {
                 let start_ns = monotonic_ns();
                 delivery.record(start_ns.saturating_sub(pair.timestamp_ns));
+                // Ground that was seen long ago may lie elsewhere by now.
+                let step_ns = last_exposure_ns.map(|last| pair.timestamp_ns.saturating_sub(last));
+                if step_ns.is_some_and(|step_ns| step_ns > self.forget_ns) {
+                    detector.forget();
+                }
+                last_exposure_ns = Some(pair.timestamp_ns);
                 look(pair, detector)?;
                 detect.record(monotonic_ns().saturating_sub(start_ns));
                 place.publish(pair.timestamp_ns, pair.missed, monotonic_ns(), detector.detection());

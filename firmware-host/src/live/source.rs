@@ -42,14 +42,14 @@ pub enum RigCameraError {
 }
 
 impl RigCamera {
-    /// Opens the pictures of `pair`.
+    /// Opens the pictures of `pair`, which may be the only one that there is.
     ///
     /// # Errors
     /// When there will never be any. A camera that is not there now may come.
-    pub fn open(pair: &RigPair) -> Result<Self, Failure> {
+    pub fn open(pair: &RigPair, only: bool) -> Result<Self, Failure> {
         let rate = |rate_hz: f32| Duration::from_secs_f32(1.0 / rate_hz);
         match &pair.source {
-            RigSource::Camera(settings) => open_camera(settings),
+            RigSource::Camera(settings) => open_camera(settings, only),
             RigSource::Recording(RecordingSettings { path, repeat, rate_hz }) => {
                 let camera = PacedCamera::new(Recording::open(path)?.into_camera(), rate_hz.map(rate));
                 Ok(Self::Recording(Box::new(PlayedRecording { camera, repeat: *repeat })))
@@ -65,12 +65,13 @@ impl RigCamera {
 }
 
 #[cfg(all(feature = "v4l", target_os = "linux"))]
-fn open_camera(settings: &fencepost_hal::camera::CameraSettings) -> Result<RigCamera, Failure> {
+fn open_camera(settings: &fencepost_hal::camera::CameraSettings, only: bool) -> Result<RigCamera, Failure> {
     use fencepost_hal::camera::v4l2::V4l2Camera;
 
-    // A camera that is not there may come: the loop waits for it and says so.
+    // A camera that is not there may come: the loop waits for it and says so. One that cannot do what is asked of it never
+    // will, which is an error where it is the only one.
     let camera = match V4l2Camera::open(settings) {
-        Err(error) if error.kind() == CameraErrorKind::Lost => V4l2Camera::closed(settings),
+        Err(error) if error.kind() == CameraErrorKind::Lost || !only => V4l2Camera::closed(settings),
         opened => opened,
     };
     let camera = camera.map_err(|error| Failure::work(error.to_string()))?;
@@ -78,7 +79,7 @@ fn open_camera(settings: &fencepost_hal::camera::CameraSettings) -> Result<RigCa
 }
 
 #[cfg(not(all(feature = "v4l", target_os = "linux")))]
-fn open_camera(_: &fencepost_hal::camera::CameraSettings) -> Result<RigCamera, Failure> {
+fn open_camera(_: &fencepost_hal::camera::CameraSettings, _: bool) -> Result<RigCamera, Failure> {
     Err(no_v4l())
 }
 

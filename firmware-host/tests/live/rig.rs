@@ -71,7 +71,7 @@ impl Orders {
         slot.1 = u64::MAX;
     }
 
-    /// When the newest order was carried out, nanoseconds; `None` if it was not yet.
+    /// When the first pair came that the newest order was carried out on, nanoseconds; `None` if it did not yet.
     pub(crate) fn carried_out_ns(&self) -> Option<u64> {
         let at_ns = self.lock().1;
         (at_ns != u64::MAX).then_some(at_ns)
@@ -86,12 +86,15 @@ impl Camera for OrderedCamera {
     type Error = FaultyError<std::convert::Infallible>;
 
     fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, Self::Error> {
-        let order = self.orders.lock().0.take();
-        if let Some(order) = order {
-            order(&mut self.camera);
-            self.orders.lock().1 = monotonic_ns();
-        }
-        self.camera.next_pair(consume)
+        let Self { camera, orders } = self;
+        let order = orders.lock().0.take();
+        let ordered = order.map(|order| order(camera)).is_some();
+        camera.next_pair(|pair| {
+            if ordered {
+                orders.lock().1 = monotonic_ns();
+            }
+            consume(pair)
+        })
     }
 }
 
