@@ -129,8 +129,10 @@ widht = 3
         (24, "pair[0].camera.right"),
         (26, "pair[0].camera.width"),
         (27, "pair[0].camera.height"),
+        (28, "pair[1].mount"),
         (30, "pair[1].scene.widht"),
         (31, "pair[2]"),
+        (31, "pair[2].mount"),
     ];
     assert_eq!(found, expected, "{mistakes:#?}");
     let mend = |field: &str| mistakes.iter().find(|m| m.field == field).unwrap().mend.as_str();
@@ -158,4 +160,25 @@ fn a_recording_is_replayed_with_the_file_of_a_rig_whose_cameras_are_elsewhere() 
     let config = read("[matching]\nwindow = 9\n[[pair]]\ncalibration = [\"none.yaml\"]\n[pair.camera]\n").unwrap();
     assert_eq!(config.settings_for(640).matching.window, 9);
     assert!(config.rig.pairs.is_empty());
+}
+
+#[test]
+fn several_pairs_need_mounts_of_their_own() {
+    let scene = "[pair.scene]\nwidth = 96\nheight = 72\nframes = 1\n";
+    let fields = |text: &str| -> Vec<String> {
+        let (_, mistakes) = Config::parse(text, Path::new(""), true);
+        mistakes.into_iter().map(|mistake| mistake.field).collect()
+    };
+    let mount = |yaw: &str| format!("[pair.mount]\nheight_m = 1.0\nyaw_left_deg = {yaw}\n");
+    let two = |first: &str, second: &str| format!("[[pair]]\n{first}{scene}[[pair]]\n{second}{scene}");
+    assert_eq!(fields(&two(&mount("0.0"), &mount("90.0"))), [""; 0]);
+    assert_eq!(fields(&two(&mount("0.0"), "")), ["pair[1].mount"]);
+    assert_eq!(fields(&two(&mount("0.0"), &mount("0.0"))), ["pair[1].mount"]);
+    let whose = format!("[mount]\nheight_m = 1.0\n{}", two(&mount("0.0"), &mount("90.0")));
+    assert_eq!(fields(&whose), ["mount"]);
+
+    let one = format!("[mount]\nheight_m = 0.7\n[[pair]]\n{scene}");
+    let (config, mistakes) = Config::parse(&one, Path::new(""), true);
+    assert_eq!(mistakes, []);
+    assert_eq!(config.rig.pairs[0].mount.height_m, Some(0.7), "with one pair it is clear whose it is");
 }
