@@ -365,6 +365,10 @@ impl<C: Camera> Camera for FaultyCamera<C> {
         });
         lent.map_err(FaultyError::Camera)
     }
+
+    fn take_warning(&mut self) -> Option<String> {
+        self.camera.take_warning()
+    }
 }
 
 impl<E: CameraError> CameraError for FaultyError<E> {

@@ -8,6 +8,7 @@ struct Plain {
     pairs: u32,
     next: u32,
     size: (usize, usize),
+    odd: bool,
 }
 
 fn pixel(right: bool, pair: u32, x: usize, y: usize) -> u8 {
@@ -39,6 +40,19 @@ impl Camera for Plain {
         };
         Ok(Some(consume(&pair)))
     }
+
+    fn take_warning(&mut self) -> Option<String> {
+        std::mem::take(&mut self.odd).then(|| "odd".to_owned())
+    }
+}
+
+#[test]
+fn warnings_pass_through_whatever_is_in_front_of_the_camera() {
+    let plain = Plain { pairs: 4, next: 2, size: (WIDTH, HEIGHT), odd: true };
+    let paced = crate::camera::PacedCamera::new(plain, None);
+    let mut camera = FaultyCamera::new(paced, (WIDTH, HEIGHT), 0, 1);
+    assert_eq!(camera.take_warning().as_deref(), Some("odd"));
+    assert_eq!(camera.take_warning(), None);
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +65,7 @@ struct Seen {
 }
 
 fn camera(pairs: u32) -> FaultyCamera<Plain> {
-    FaultyCamera::new(Plain { pairs, next: 0, size: (WIDTH, HEIGHT) }, (WIDTH, HEIGHT), 3, 42)
+    FaultyCamera::new(Plain { pairs, next: 0, size: (WIDTH, HEIGHT), odd: false }, (WIDTH, HEIGHT), 3, 42)
 }
 
 fn next(camera: &mut FaultyCamera<Plain>) -> Result<Option<Seen>, CameraErrorKind> {
@@ -105,7 +119,7 @@ fn errors_last_as_many_calls_as_were_set_and_time_goes_on_meanwhile() {
 #[test]
 fn chances_are_met_as_often_as_they_say_and_repeat_with_the_seed() {
     let run = |seed| {
-        let plain = Plain { pairs: 3000, next: 0, size: (4, 2) };
+        let plain = Plain { pairs: 3000, next: 0, size: (4, 2), odd: false };
         let mut camera = FaultyCamera::new(plain, (4, 2), 0, seed);
         camera.set_drop_chance(20);
         camera.set_damage_chance(10);
@@ -235,13 +249,13 @@ fn times_jump_and_go_round() {
 
 #[test]
 fn pictures_of_another_size_pass_with_their_pixels() {
-    let plain = Plain { pairs: 2, next: 0, size: (8, 4) };
+    let plain = Plain { pairs: 2, next: 0, size: (8, 4), odd: false };
     let mut camera = FaultyCamera::new(plain, (WIDTH, HEIGHT), 1, 1);
     camera.set_dark(Sides::Both);
     camera.set_time_offset(7);
     let seen = next(&mut camera).unwrap().unwrap();
     assert_eq!((seen.left, seen.timestamp_ns), (picture(false, 0, (8, 4)), 7));
-    let mut empty = FaultyCamera::new(Plain { pairs: 2, next: 0, size: (8, 4) }, (0, 0), 0, 1);
+    let mut empty = FaultyCamera::new(Plain { pairs: 2, next: 0, size: (8, 4), odd: false }, (0, 0), 0, 1);
     empty.set_row_shift(1);
     assert!(next(&mut empty).unwrap().is_some());
 }

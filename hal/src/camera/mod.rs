@@ -74,4 +74,10 @@ pub trait Camera {
     /// # Errors
     /// When the pair cannot be had; the next call tries the one after it.
     fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, Self::Error>;
+
+    /// The oldest thing that was found odd and not asked for yet, in words; to be asked for now and then. Takes no memory while
+    /// there is none.
+    fn take_warning(&mut self) -> Option<String> {
+        None
+    }
 }

@@ -53,7 +53,7 @@ impl<C: Camera> Camera for PacedCamera<C> {
             let mut due = Instant::now();
             if let Some(before) = *last {
                 let own = Duration::from_nanos(pair.timestamp_ns.saturating_sub(before.timestamp_ns));
-                let planned = before.at + period.unwrap_or(own).min(LONGEST_WAIT);
+                let planned = before.at + wait(*period, own);
                 thread::sleep(planned.saturating_duration_since(due));
                 // Whoever takes longer than a period loses none of the pairs and is not hurried afterwards.
                 due = due.max(planned);
@@ -62,6 +62,15 @@ impl<C: Camera> Camera for PacedCamera<C> {
             consume(&StereoPair { timestamp_ns: monotonic_ns(), ..*pair })
         })
     }
+
+    fn take_warning(&mut self) -> Option<String> {
+        self.camera.take_warning()
+    }
+}
+
+/// From one pair to the next: as was asked, or as it was recorded.
+fn wait(period: Option<Duration>, recorded: Duration) -> Duration {
+    period.unwrap_or(recorded.min(LONGEST_WAIT))
 }
 
 #[cfg(test)]
@@ -69,6 +78,13 @@ mod tests {
     use super::*;
     use crate::camera::MemoryCamera;
     use crate::scene::{Scene, SceneOptions};
+
+    #[test]
+    fn pauses_of_a_recording_are_cut_short_but_a_period_that_was_asked_for_is_kept() {
+        let [short, long, hour] = [40, 2500, 3_600_000].map(Duration::from_millis);
+        assert_eq!([wait(None, short), wait(None, hour)], [short, LONGEST_WAIT]);
+        assert_eq!([wait(Some(long), short), wait(Some(short), hour)], [long, short]);
+    }
 
     #[test]
     fn pairs_come_in_order_no_sooner_than_due_and_stamped_with_the_time_of_delivery() {

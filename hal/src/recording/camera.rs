@@ -89,6 +89,10 @@ impl Camera for RecordedCamera {
         let right = view(frame, &right_path, &right)?;
         Ok(Some(consume(&StereoPair { left, right, timestamp_ns, skew_ns: 0, sequence: frame, missed: 0 })))
     }
+
+    fn take_warning(&mut self) -> Option<String> {
+        (!self.warnings.is_empty()).then(|| self.warnings.remove(0).to_string())
+    }
 }
 
 impl GreyPicture {

@@ -7,6 +7,10 @@ use sequence::Sequence;
 /// Pictures further apart than this come from clocks that do not agree, nanoseconds: no camera waits so long.
 const APART_NS: u64 = 1_000_000_000;
 
+/// A time further than this after the one before it has jumped, nanoseconds: a camera that delivered nothing for so long is
+/// opened again, which begins anew.
+const AHEAD_NS: u64 = 10_000_000_000;
+
 /// One of the two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
@@ -14,6 +18,17 @@ pub enum Side {
     Left,
     /// Right camera.
     Right,
+}
+
+impl Side {
+    /// The other camera.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
 }
 
 /// What a driver says of a picture.
@@ -53,7 +68,7 @@ pub struct PairingCounts {
     pub lost: u64,
     /// Pictures that were passed over because a newer one had come.
     pub passed_over: u64,
-    /// Times of exposure that were before the one of the same camera's last picture.
+    /// Times of exposure that were before the one of the same camera's last picture, or more than ten seconds after it.
     pub jumps: u64,
     /// Numbers that began anew.
     pub restarts: u64,
@@ -193,7 +208,9 @@ impl<T> Pairing<T> {
 
     fn note(&mut self, side: Side, stamp: Stamp) {
         let stream = self.stream(side);
-        let jumped = stream.last_ns.replace(stamp.timestamp_ns).is_some_and(|last_ns| stamp.timestamp_ns < last_ns);
+        let now_ns = stamp.timestamp_ns;
+        let jumped = |last_ns: u64| now_ns < last_ns || now_ns - last_ns > AHEAD_NS;
+        let jumped = stream.last_ns.replace(now_ns).is_some_and(jumped);
         let step = stream.numbers.next(stamp.sequence);
         stream.lost = stream.lost.saturating_add(step.lost);
         self.counts.jumps += u64::from(jumped);

@@ -163,7 +163,7 @@ fn clocks_that_jump_or_wrap_are_survived_and_said() {
         // As long as time is repeated, the older pictures are dropped; afterwards everything is as before.
         let last = pairs.last().unwrap();
         assert_eq!((last.left, last.right), (79, 79), "seed {seed}: jump {jump} ns");
-        if jump < -(PERIOD_NS as i64) {
+        if jump < -(PERIOD_NS as i64) || jump > 10_000_000_000 {
             assert!(pairing.counts().jumps >= 2, "seed {seed}: said");
         }
     }

@@ -15,14 +15,12 @@ use v4l2r::memory::MemoryType;
 use v4l2r::nix::errno::Errno;
 
 use super::error::{V4l2Error, V4l2Problem};
+use super::times::Times;
 use super::{offers, setup};
 use crate::camera::pairing::Stamp;
 use crate::camera::pixels::PixelError;
 use crate::camera::{CameraSettings, PixelFormat};
 use crate::clock::monotonic_ns;
-
-/// A copied time further back than this is no time of this machine's monotonic clock, nanoseconds.
-const LONGEST_DELAY_NS: u64 = 10_000_000_000;
 
 /// A device that streams.
 ///
@@ -31,7 +29,7 @@ pub(super) struct Device {
     pub(super) path: Arc<Path>,
     queue: QueueType,
     pub(super) pictures: Pictures,
-    clock: Clock,
+    pub(super) times: Times,
     /// When the last picture came, or the stream began.
     pub(super) alive_ns: u64,
     buffers: Vec<PlaneMapping>,
@@ -47,17 +45,6 @@ pub(super) struct Pictures {
     pub(super) stride: usize,
     /// Fewest bytes of a picture.
     pub(super) needed: usize,
-}
-
-/// Where the times of exposure come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Clock {
-    /// Not known before the first picture.
-    Unknown,
-    /// The driver's times are those of the monotonic clock.
-    Driver,
-    /// The driver has none: the time when the picture is taken over stands in.
-    Arrival,
 }
 
 /// A buffer that the driver has filled and that is not given back yet.
@@ -98,7 +85,7 @@ impl Device {
             path: Arc::clone(path),
             queue,
             pictures,
-            clock: Clock::Unknown,
+            times: Times::new(monotonic_ns()),
             alive_ns: monotonic_ns(),
             buffers: Vec::new(),
             file,
@@ -111,15 +98,17 @@ impl Device {
         Ok(device)
     }
 
-    /// Waits until the device has a picture or `deadline_ns` has come. Watches `other` for the case that it goes.
-    pub(super) fn wait(&self, other: Option<&Self>, deadline_ns: u64) -> Result<bool, V4l2Error> {
+    /// Waits until the device has a picture or `deadline_ns` has come. Watches `other` for the case that it goes, and with
+    /// `either` for a picture as well.
+    pub(super) fn wait(&self, other: Option<&Self>, either: bool, deadline_ns: u64) -> Result<bool, V4l2Error> {
         const GONE: PollFlags = PollFlags::ERR.union(PollFlags::HUP).union(PollFlags::NVAL);
         loop {
             let left_ns = deadline_ns.saturating_sub(monotonic_ns());
             let timeout =
                 Timespec { tv_sec: (left_ns / 1_000_000_000) as i64, tv_nsec: (left_ns % 1_000_000_000) as _ };
             let second = other.map_or(&self.file, |other| &other.file);
-            let mut watched = [PollFd::new(&self.file, PollFlags::IN), PollFd::new(second, PollFlags::empty())];
+            let of_second = if either { PollFlags::IN } else { PollFlags::empty() };
+            let mut watched = [PollFd::new(&self.file, PollFlags::IN), PollFd::new(second, of_second)];
             let count = if other.is_some() { 2 } else { 1 };
             match poll(watched.get_mut(..count).unwrap_or_default(), Some(&timeout)) {
                 Ok(0) => return Ok(false),
@@ -130,7 +119,7 @@ impl Device {
                     {
                         return Err(V4l2Error::gone(&other.path, "poll", io::ErrorKind::BrokenPipe.into()));
                     }
-                    if own.intersects(PollFlags::IN) {
+                    if own.intersects(PollFlags::IN) || other.is_some() && second.intersects(PollFlags::IN) {
                         return Ok(true);
                     }
                     return Err(V4l2Error::gone(&self.path, "poll", io::ErrorKind::BrokenPipe.into()));
@@ -141,12 +130,15 @@ impl Device {
         }
     }
 
-    /// Takes over the oldest picture that the driver has, without waiting. `warnings` are told once where times come from.
-    pub(super) fn take(&mut self, warnings: &mut Vec<String>) -> Result<Taken, V4l2Error> {
+    /// Takes over the oldest picture that the driver has, without waiting.
+    pub(super) fn take(&mut self) -> Result<Taken, V4l2Error> {
         let gone = |error| Err(V4l2Error::gone(&self.path, "VIDIOC_DQBUF", error));
         let buffer: V4l2Buffer = match ioctl::dqbuf(&self.file, self.queue) {
             Ok(buffer) => buffer,
-            Err(IoctlConvertError::IoctlError(ioctl::DqBufIoctlError::NotReady)) => return Ok(Taken::Nothing),
+            Err(IoctlConvertError::IoctlError(ioctl::DqBufIoctlError::NotReady)) => {
+                self.times.empty(monotonic_ns());
+                return Ok(Taken::Nothing);
+            }
             Err(IoctlConvertError::IoctlError(error)) => return gone(os(error)),
             // The buffer's number is not told: it is lost until the device is opened again.
             Err(IoctlConvertError::ConversionError(error)) => return gone(io::Error::other(error)),
@@ -156,17 +148,7 @@ impl Device {
         let raw: &v4l2_buffer = buffer.as_v4l2_buffer();
         #[allow(clippy::useless_conversion, reason = "of 32 bits on some machines")]
         let driver_ns = nanoseconds(raw.timestamp.tv_sec.into(), raw.timestamp.tv_usec.into());
-        if self.clock == Clock::Unknown {
-            self.clock = clock(buffer.flags(), driver_ns, now_ns);
-            if self.clock == Clock::Arrival {
-                warnings.push(format!(
-                    "{}: its driver does not say when a picture was exposed; the time when it arrives stands in, so that the \
-                     pairing of left and right and the age of the cells are less exact",
-                    self.path.display()
-                ));
-            }
-        }
-        let timestamp_ns = if self.clock == Clock::Driver { driver_ns } else { now_ns };
+        let timestamp_ns = self.times.exposed_ns(buffer.flags(), driver_ns, now_ns);
         let stamp = Stamp { timestamp_ns, sequence: raw.sequence };
         let index = raw.index;
         let plane = buffer.get_first_plane();
@@ -199,6 +181,11 @@ impl Device {
     /// Gives a picture's buffer back to the driver, to be filled again.
     pub(super) fn put_back(&mut self, frame: Frame) -> Result<(), V4l2Error> {
         self.give_back(frame.index).map_err(|error| V4l2Error::gone(&self.path, "VIDIOC_QBUF", error))
+    }
+
+    /// How many pictures can wait in the driver.
+    pub(super) const fn room(&self) -> usize {
+        self.buffers.len()
     }
 
     fn map(&mut self, index: u32) -> Result<(), V4l2Error> {
@@ -263,32 +250,9 @@ const fn nanoseconds(seconds: i64, microseconds: i64) -> u64 {
     whole.wrapping_add(microseconds.cast_unsigned().wrapping_mul(1000))
 }
 
-/// Which times to trust. Times that were copied from whoever wrote the picture (a loopback device) are good if they can be
-/// of this machine's clock.
-fn clock(flags: BufferFlags, driver_ns: u64, now_ns: u64) -> Clock {
-    let copied = flags.contains(BufferFlags::TIMESTAMP_COPY);
-    let plausible = driver_ns <= now_ns && now_ns - driver_ns < LONGEST_DELAY_NS;
-    match flags.contains(BufferFlags::TIMESTAMP_MONOTONIC) || copied && plausible {
-        true => Clock::Driver,
-        false => Clock::Arrival,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn times_are_trusted_as_the_flags_say() {
-        let now = 50_000_000_000;
-        let monotonic = BufferFlags::TIMESTAMP_MONOTONIC;
-        assert_eq!(clock(monotonic, 1, now), Clock::Driver);
-        assert_eq!(clock(monotonic, u64::MAX, now), Clock::Driver, "a driver that makes its times wrap");
-        assert_eq!(clock(BufferFlags::TIMESTAMP_COPY, now - 1000, now), Clock::Driver);
-        assert_eq!(clock(BufferFlags::TIMESTAMP_COPY, now + 1, now), Clock::Arrival, "not of this machine");
-        assert_eq!(clock(BufferFlags::TIMESTAMP_COPY, 0, now), Clock::Arrival);
-        assert_eq!(clock(BufferFlags::empty(), now - 1000, now), Clock::Arrival);
-    }
 
     #[test]
     fn seconds_and_microseconds() {

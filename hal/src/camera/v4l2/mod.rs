@@ -11,6 +11,7 @@ mod error;
 mod list;
 mod offers;
 mod setup;
+mod times;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,7 +20,7 @@ use std::time::Duration;
 pub use error::{V4l2Error, V4l2Problem};
 pub use list::list;
 
-use super::pairing::{Paired, Pairing, PairingCounts, Side};
+use super::pairing::{Paired, Pairing, PairingCounts, Side, Stamp};
 use super::pixels::{self, Unpacker};
 use super::{
     Camera, CameraDevices, CameraError, CameraErrorKind, CameraSettings, CameraSettingsError, PackedLayout,
@@ -27,6 +28,7 @@ use super::{
 };
 use crate::clock::monotonic_ns;
 use device::{Device, Frame, Taken};
+use times::OddTimes;
 
 /// Time between two attempts to open a device that is gone, nanoseconds.
 const RETRY_NS: u64 = 100_000_000;
@@ -51,6 +53,8 @@ pub struct V4l2Camera {
     waiting_since_ns: Option<u64>,
     pairing: Pairing<Frame>,
     said: PairingCounts,
+    /// Of which device it was said that its times are odd.
+    said_times: [bool; 2],
     warnings: Vec<String>,
 }
 
@@ -103,6 +107,7 @@ impl V4l2Camera {
             waiting_since_ns: None,
             pairing: Pairing::new(settings.pairing_tolerance_ns()),
             said: PairingCounts::default(),
+            said_times: [false; 2],
             warnings: Vec::new(),
             settings: settings.clone(),
         })
@@ -175,6 +180,17 @@ impl V4l2Camera {
         self.open = None;
     }
 
+    /// Makes a call ready whose caller may have been away.
+    ///
+    /// What arrived meanwhile cannot be given its time where that is the time of arrival: it would seem newer than it is. Such
+    /// pictures are passed over, except where every pair is wanted.
+    fn begin(&mut self) -> Result<(), V4l2Error> {
+        match &mut self.open {
+            Some(open) if self.settings.newest_only => open.pass_over_waiting(&mut self.pairing),
+            _ => Ok(()),
+        }
+    }
+
     /// Takes pictures until two of them are a pair.
     ///
     /// # Bound
@@ -186,16 +202,27 @@ impl V4l2Camera {
             let Some(open) = &mut self.open else {
                 return Err(V4l2Error::new(&self.left, V4l2Problem::NotBack));
             };
-            let side = self.pairing.wanted();
-            let pair = open.take(side, &mut self.pairing, self.settings.newest_only, &mut self.warnings)?;
-            if let Some(pair) = pair.pair {
+            // A picture whose time is that of its arrival is taken over when it arrives, whichever side is due.
+            let either = open.by_arrival();
+            let mut side = self.pairing.wanted();
+            let mut attempt = open.take(side, &mut self.pairing, self.settings.newest_only)?;
+            if either && !attempt.taken && open.right.is_some() {
+                let other = side.other();
+                attempt = open.take(other, &mut self.pairing, self.settings.newest_only)?;
+                side = if attempt.taken { other } else { side };
+            }
+            if let Some(pair) = attempt.pair {
                 return Ok(pair);
             }
-            if pair.taken {
+            if attempt.taken {
                 came[usize::from(side == Side::Right)] = true;
             }
             // A device that delivers pictures without partners must not hold the caller up.
-            if (pair.taken && monotonic_ns() < deadline_ns) || (!pair.taken && open.wait(side, deadline_ns)?) {
+            let goes_on = match attempt.taken {
+                true => monotonic_ns() < deadline_ns,
+                false => open.wait(side, either, deadline_ns)?,
+            };
+            if goes_on {
                 continue;
             }
             let problem = match came {
@@ -216,14 +243,25 @@ impl V4l2Camera {
         }
     }
 
-    /// Says once what the pairing has found odd.
+    /// Says once what is odd about the pictures.
     fn say(&mut self) {
+        if let Some(open) = &self.open {
+            let devices = [Some(&open.left.device), open.right.as_ref().map(|right| &right.device)];
+            for (device, said) in devices.into_iter().flatten().zip(&mut self.said_times) {
+                // Memory is taken for the first one only.
+                if let Some(odd) = device.times.odd()
+                    && !std::mem::replace(said, true)
+                {
+                    self.warnings.push(odd_times(&device.path, odd));
+                }
+            }
+        }
         let counts = self.pairing.counts();
         let odd = [
             (
                 counts.jumps,
                 &mut self.said.jumps,
-                "times of exposure have jumped back; pictures from before and after are never paired",
+                "times of exposure have jumped; pictures from before and after are never paired",
             ),
             (
                 counts.restarts,
@@ -252,7 +290,8 @@ impl Camera for V4l2Camera {
     fn next_pair<R>(&mut self, consume: impl FnOnce(&StereoPair<'_>) -> R) -> Result<Option<R>, Self::Error> {
         let deadline_ns = self.deadline_ns();
         self.ready(deadline_ns)?;
-        let pair = self.wait_for_pair(deadline_ns);
+        let begun = self.begin();
+        let pair = begun.and_then(|()| self.wait_for_pair(deadline_ns));
         self.waiting_since_ns = Some(monotonic_ns());
         let result = pair.and_then(|pair| {
             let not_back = || V4l2Error::new(&self.left, V4l2Problem::NotBack);
@@ -272,6 +311,10 @@ impl Camera for V4l2Camera {
             self.close();
         }
         result.map(Some)
+    }
+
+    fn take_warning(&mut self) -> Option<String> {
+        (!self.warnings.is_empty()).then(|| self.warnings.remove(0))
     }
 }
 
@@ -303,26 +346,55 @@ impl Open {
         }
     }
 
-    fn wait(&self, side: Side, deadline_ns: u64) -> Result<bool, V4l2Error> {
+    fn wait(&self, side: Side, either: bool, deadline_ns: u64) -> Result<bool, V4l2Error> {
         match (side, &self.right) {
-            (Side::Right, Some(right)) => right.device.wait(Some(&self.left.device), deadline_ns),
-            (_, right) => self.left.device.wait(right.as_ref().map(|right| &right.device), deadline_ns),
+            (Side::Right, Some(right)) => right.device.wait(Some(&self.left.device), either, deadline_ns),
+            (_, right) => self.left.device.wait(right.as_ref().map(|right| &right.device), either, deadline_ns),
         }
     }
 
+    /// Whether the time of arrival stands in for the time of exposure, on either side.
+    fn by_arrival(&self) -> bool {
+        let trusted = |lens: &Lens| lens.device.times.trusted();
+        !(trusted(&self.left) && self.right.as_ref().is_none_or(trusted))
+    }
+
+    /// Passes over what waits in the drivers, as long as times are those of arrival.
+    ///
+    /// # Bound
+    /// As many pictures as can wait.
+    fn pass_over_waiting(&mut self, pairing: &mut Pairing<Frame>) -> Result<(), V4l2Error> {
+        let both = self.right.is_none();
+        for side in [Side::Left, Side::Right].into_iter().take(if both { 1 } else { 2 }) {
+            for _ in 0..self.lens(side).device.room() {
+                let device = &mut self.lens(side).device;
+                if device.times.trusted() {
+                    break;
+                }
+                let (stamp, note): (_, fn(&mut Pairing<Frame>, Side, Stamp)) = match device.take()? {
+                    Taken::Nothing => break,
+                    Taken::Damaged(stamp, _) => (stamp, Pairing::damaged),
+                    Taken::Picture(stamp, frame) => {
+                        device.put_back(frame)?;
+                        (stamp, Pairing::pass_over)
+                    }
+                };
+                note(pairing, side, stamp);
+                if both {
+                    note(pairing, Side::Right, stamp);
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Takes the next picture of `side`, without waiting; with `newest` the newest that is there.
-    fn take(
-        &mut self,
-        side: Side,
-        pairing: &mut Pairing<Frame>,
-        newest: bool,
-        warnings: &mut Vec<String>,
-    ) -> Result<Attempt, V4l2Error> {
+    fn take(&mut self, side: Side, pairing: &mut Pairing<Frame>, newest: bool) -> Result<Attempt, V4l2Error> {
         let both = self.right.is_none();
         let lens = self.lens(side);
         let mut found = None;
         loop {
-            match lens.device.take(warnings)? {
+            match lens.device.take()? {
                 Taken::Nothing => break,
                 Taken::Picture(stamp, frame) => {
                     if let Some((older, frame)) = found.replace((stamp, frame)) {
@@ -409,6 +481,15 @@ impl std::fmt::Debug for V4l2Camera {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("V4l2Camera").field("settings", &self.settings).field("is_open", &self.is_open()).finish()
     }
+}
+
+fn odd_times(device: &Path, odd: OddTimes) -> String {
+    format!(
+        "{}: {}; the time when a picture arrives stands in, so that the pairing of left and right and the age of the cells are \
+         less exact",
+        device.display(),
+        odd.what()
+    )
 }
 
 /// The buffers of a pair: one where both pictures lie in it.
