@@ -13,7 +13,10 @@ use crate::{
     error::ConfigError,
     geometry::{DepthTable, Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
     ground::{GroundFinder, GroundPlane, Terrain},
-    health::{self, Content, ContentSigns, Debounce, Exposure, HealthLevel, HealthSettings, SearchRange, Signs},
+    health::{
+        self, Content, ContentSigns, Debounce, Exposure, HealthLevel, HealthSettings, RecentPictures, SearchRange,
+        Signs,
+    },
     map::{MapBuilder, SectorDistances, View},
     matching::{MatchSettings, Matcher, ValidSpan},
     obstacles::ObstacleFinder,
@@ -59,7 +62,7 @@ pub struct Detector<
     health: HealthSettings,
     content: Content<WIDTH>,
     content_signs: ContentSigns,
-    exposures: Option<[Exposure; 2]>,
+    recent_pictures: RecentPictures,
     debounce: Debounce,
     /// One row of disparities, for looking at a few rows the other way round.
     probe_row: [DisparityPixel; WIDTH],
@@ -109,7 +112,7 @@ impl<
             health: HealthSettings::UNSET,
             content: Content::new(),
             content_signs: ContentSigns::UNSET,
-            exposures: None,
+            recent_pictures: RecentPictures::NONE,
             debounce: Debounce::new(0, 0),
             probe_row: [DisparityPixel::from_bits(0); WIDTH],
             detection: Detection::new(),
@@ -184,7 +187,7 @@ impl<
     fn forget_pictures(&mut self) {
         self.content.clear();
         self.content_signs = ContentSigns::UNSET;
-        self.exposures = None;
+        self.recent_pictures = RecentPictures::NONE;
     }
 
     /// Looks at a pair of pictures. `probe` is told which stage runs.
@@ -246,7 +249,7 @@ impl<
         let exposures = [Exposure::of(left), Exposure::of(right)];
         let signs = Signs {
             exposures,
-            exposures_before: self.exposures.replace(exposures),
+            came_again: self.recent_pictures.came_again(&exposures),
             content: self.content_signs,
             picture: DisparityPicture::new(&self.disparity[..width * height], width),
             statistics: &self.detection.statistics,

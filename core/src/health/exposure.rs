@@ -1,4 +1,6 @@
-//! How a picture is exposed, and whether it is the one that came before.
+//! How a picture is exposed, and whether it is one that came before.
+
+use core::num::NonZeroU64;
 
 use crate::picture::Picture;
 
@@ -10,6 +12,18 @@ const BRIGHT: u8 = 250;
 
 /// Every so manieth row and column is looked at.
 const STEP: usize = 4;
+
+/// Frames that a picture is compared with.
+///
+/// A driver whose ring of buffers stands still hands out the same old pictures in turn: rings of up to this many show. Longer ones
+/// do not: a short recording that is played over and over, four frames and more, looks just like that and is to be looked at.
+const REMEMBERED: usize = 3;
+
+/// The fingerprints of the newest pictures of both sides, newest first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RecentPictures {
+    fingerprints: [[Option<NonZeroU64>; REMEMBERED]; 2],
+}
 
 /// How a picture is exposed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,7 +38,7 @@ pub struct Exposure {
     ///
     /// The noise of a sensor makes two pictures of the same thing different somewhere, so that the same number twice means the
     /// same picture twice. Source: FNV-1a (Fowler, Noll, Vo), 64 bits.
-    pub fingerprint: Option<u64>,
+    pub fingerprint: Option<NonZeroU64>,
 }
 
 impl Exposure {
@@ -50,7 +64,26 @@ impl Exposure {
             mean: sum as f32 * each,
             dark_percent: 100.0 * dark as f32 * each,
             bright_percent: 100.0 * bright as f32 * each,
-            fingerprint: (least < most).then_some(hash),
+            fingerprint: NonZeroU64::new(hash).filter(|_| least < most),
         }
+    }
+}
+
+impl RecentPictures {
+    /// No picture came yet.
+    pub(crate) const NONE: Self = Self { fingerprints: [[None; REMEMBERED]; 2] };
+
+    /// Whether the left and the right picture are, to the bit, among those of the newest frames; remembers them.
+    ///
+    /// # Bound
+    /// `2 x REMEMBERED` comparisons.
+    pub(crate) fn came_again(&mut self, exposures: &[Exposure; 2]) -> [bool; 2] {
+        let mut again = [false; 2];
+        for ((again, recent), now) in again.iter_mut().zip(&mut self.fingerprints).zip(exposures) {
+            *again = now.fingerprint.is_some() && recent.contains(&now.fingerprint);
+            recent.rotate_right(1);
+            recent[0] = now.fingerprint;
+        }
+        again
     }
 }

@@ -14,6 +14,7 @@ pub(crate) use content::Content;
 pub use content::ContentSigns;
 pub use debounce::{Debounce, Findings};
 pub use exposure::Exposure;
+pub(crate) use exposure::RecentPictures;
 pub use pairing::PairingSign;
 pub use reasons::{Health, HealthLevel, HealthReason};
 pub use row_error::RowSign;
@@ -35,8 +36,8 @@ const LEAST_COVERED: u16 = 3;
 pub(crate) struct Signs<'a> {
     /// Left and right.
     pub(crate) exposures: [Exposure; 2],
-    /// Left and right of the frame before, if there was one.
-    pub(crate) exposures_before: Option<[Exposure; 2]>,
+    /// Whether left and right are pictures that came before.
+    pub(crate) came_again: [bool; 2],
     pub(crate) content: ContentSigns,
     pub(crate) picture: DisparityPicture<'a>,
     pub(crate) statistics: &'a Statistics,
@@ -94,11 +95,8 @@ fn judge_exposure(signs: &Signs<'_>, settings: &HealthSettings, findings: &mut F
     if left.mean.max(right.mean) > settings.exposure_ratio * left.mean.min(right.mean).max(1.0) {
         findings.raise(HealthReason::ExposureMismatch, HealthLevel::Degraded);
     }
-    let before = signs.exposures_before.unwrap_or_default();
-    for (now, before) in [left, right].into_iter().zip(before) {
-        if now.fingerprint.is_some() && now.fingerprint == before.fingerprint {
-            findings.raise(HealthReason::FrozenPicture, HealthLevel::Blind);
-        }
+    if signs.came_again.contains(&true) {
+        findings.raise(HealthReason::FrozenPicture, HealthLevel::Blind);
     }
 }
 

@@ -118,6 +118,28 @@ fn a_frozen_picture_frees_nothing_and_is_forgiven() {
 }
 
 #[test]
+fn a_ring_of_old_pictures_is_frozen_and_a_short_recording_is_not() {
+    let (left, right) = wall(10, |grey| grey);
+    for (ring, sides, is_frozen) in
+        [(2, [true; 2], true), (3, [true, false], true), (3, [false, true], true), (4, [true; 2], false)]
+    {
+        let mut random = Random::seeded("sensor noise", 0x5eed_0073);
+        let mut noisy =
+            |picture: &[u8]| -> Vec<u8> { picture.iter().map(|grey| grey + random.below(3) as u8).collect() };
+        let mut detector = detector();
+        let pictures: Vec<_> = (0..12).map(|_| [noisy(&left), noisy(&right)]).collect();
+        // The first frames are new; from then on the newest of them come in turn.
+        for frame in 0..12 {
+            let shown = |side: usize| if sides[side] && frame >= 4 { 4 - ring + frame % ring } else { frame };
+            let view = |side: usize| Picture::packed(&pictures[shown(side)][side], WIDTH, HEIGHT).unwrap();
+            let health = detector.detect(&view(0), &view(1), &mut ()).unwrap().health;
+            let expected = is_frozen && frame >= 4;
+            assert_eq!(health.has(HealthReason::FrozenPicture), expected, "ring of {ring}, {sides:?}, frame {frame}");
+        }
+    }
+}
+
+#[test]
 fn settings_that_cannot_be_are_named() {
     let good = HealthSettings::default();
     assert_eq!(good.check(), Ok(()));
