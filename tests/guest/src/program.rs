@@ -40,8 +40,17 @@ impl Program {
     /// # Panics
     /// When it cannot be started.
     pub fn start(arguments: &str) -> Self {
+        Self::start_with_env(arguments, &[])
+    }
+
+    /// As [`Program::start`], with names and values added to the environment.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    pub fn start_with_env(arguments: &str, environment: &[(&str, &str)]) -> Self {
         assert_guest();
         let mut command = Command::new(program());
+        command.envs(environment.iter().copied());
         command.args(arguments.split_whitespace()).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap_or_else(|error| panic!("fencepost cannot be started: {error}"));
         let said = Arc::new(Mutex::new(String::new()));

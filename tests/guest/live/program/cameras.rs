@@ -26,6 +26,9 @@ const SETTINGS: &str = "[run]\ndeadline_ms = 10000\nstale_ms = 10000\npriority =
 /// The cameras deliver 60 pictures a second, so that the limit is the 100 ms.
 const PERIOD: Duration = Duration::from_millis(17);
 
+/// What is done to the cameras.
+type Act<'a> = &'a dyn Fn();
+
 fn vivid_rig(interface: &str) -> String {
     let calibration = Path::new("/tmp/tiny_calib.txt");
     fs::write(calibration, "P0: 52 0 31.5 0 0 52 23.5 0 0 0 1 0\nP1: 52 0 31.5 -6.24 0 52 23.5 0 0 0 1 0\n").unwrap();
@@ -55,7 +58,7 @@ fn every_fault_that_a_camera_can_be_ordered_to_have_is_said_and_passes() {
     let listener = Listener::open(bus.name());
     let program = start(&vivid_rig(bus.name()));
     wait_until_seeing(&listener, &program, 0);
-    let faults: [(&str, &dyn Fn(), &dyn Fn()); 6] = [
+    let faults: [(&str, Act<'_>, Act<'_>); 6] = [
         ("damaged buffer", &|| set_both("inject_v4l2_buf_flag_error", 1), &|| ()),
         ("stall", &|| set_both("percentage_of_dropped_buffers", 100), &|| set_both("percentage_of_dropped_buffers", 0)),
         ("failure while streaming", &|| set_both("inject_fatal_streaming_error", 1), &|| ()),

@@ -2,31 +2,31 @@
 
 mod buses;
 mod cameras;
+mod feeder;
+mod limits;
 mod parity;
 mod pictures;
+mod service;
+mod synthetic;
 
 use std::{
     fs,
     path::{Path, PathBuf},
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::{self, JoinHandle},
     time::Duration,
 };
 
 use fencepost_core::{
     health::{Health, HealthLevel, HealthReason},
-    picture::Picture,
     wire::{HeartbeatRepr, NodeState},
 };
-use fencepost_guest_tests::{bus::Listener, device::Writer, loopback, machine::wait_for, program::Program, say};
-use fencepost_hal::{
-    camera::{Camera, FaultyCamera, MemoryCamera, PacedCamera, StereoPair},
-    clock::monotonic_ns,
-    recording::Recording,
+use fencepost_guest_tests::{
+    bus::{Heard, HeardScan, Listener, Word},
+    program::Program,
+    say,
 };
+use fencepost_hal::{camera::MemoryCamera, recording::Recording};
+
+use feeder::{Feeder, open_writers, write_nothing, write_pair};
 
 /// Longest wait for anything under emulation; never a result.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -78,88 +78,6 @@ fn start(rig: &str) -> Program {
     Program::start(&format!("run --config {rig} -v"))
 }
 
-/// A grey pair before which nothing can be seen: a loopback device must have been written to before it can be read.
-fn write_nothing(writers: &mut [Writer; 2]) {
-    let grey = vec![128; writers[0].size()];
-    writers.iter_mut().for_each(|writer| writer.write(&grey));
-}
-
-fn open_writers() -> [Writer; 2] {
-    [loopback::LEFT, loopback::RIGHT].map(|path| Writer::open(path, *b"GREY", SIZE.0, SIZE.1))
-}
-
-fn write_pair(writers: &mut [Writer; 2], pair: &StereoPair<'_>) {
-    let pixels =
-        |picture: &Picture<'_>| (0..picture.height()).flat_map(|y| picture.row(y)).copied().collect::<Vec<_>>();
-    writers[0].write(&pixels(&pair.left));
-    writers[1].write(&pixels(&pair.right));
-}
-
-type Faulty = FaultyCamera<PacedCamera<MemoryCamera>>;
-type Order = Box<dyn FnOnce(&mut Faulty) + Send>;
-
-/// Writes the committed recording to the loopback devices over and over, spoilt to order.
-struct Feeder {
-    orders: Arc<Mutex<(Option<Order>, u64)>>,
-    end: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Feeder {
-    /// Pictures every `period`.
-    fn start(mut writers: [Writer; 2], period: Duration) -> Self {
-        write_nothing(&mut writers);
-        let paced = PacedCamera::new(trail_pictures().repeated(u32::MAX), Some(period));
-        let mut camera = FaultyCamera::new(paced, (SIZE.0 as usize, SIZE.1 as usize), 3, 1);
-        let orders: Arc<Mutex<(Option<Order>, u64)>> = Arc::default();
-        let end = Arc::new(AtomicBool::new(false));
-        let (taken, ended) = (Arc::clone(&orders), Arc::clone(&end));
-        let thread = thread::spawn(move || {
-            while !ended.load(Ordering::Relaxed) {
-                let order = lock(&taken).0.take();
-                let ordered = order.map(|order| order(&mut camera)).is_some();
-                // A pair that is kept back is an error here, and simply does not come there.
-                let _ = camera.next_pair(|pair| {
-                    if ordered {
-                        lock(&taken).1 = monotonic_ns();
-                    }
-                    write_pair(&mut writers, pair);
-                });
-            }
-        });
-        Self { orders, end, thread: Some(thread) }
-    }
-
-    /// From the next pair on; returns when that pair has been written: the time just before.
-    fn order(&self, order: impl FnOnce(&mut Faulty) + Send + 'static) -> u64 {
-        *lock(&self.orders) = (Some(Box::new(order)), 0);
-        wait_for(PATIENCE, || Some(lock(&self.orders).1).filter(|at_ns| *at_ns > 0)).expect("the order is carried out")
-    }
-
-    /// The other end of both devices is closed.
-    fn end(mut self) {
-        self.finish();
-    }
-
-    fn finish(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // What it panicked with was printed already.
-            let _ = thread.join();
-        }
-    }
-}
-
-impl Drop for Feeder {
-    fn drop(&mut self) {
-        self.finish();
-    }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 fn is_healthy(heartbeat: &HeartbeatRepr) -> bool {
     heartbeat.state == NodeState::Running && heartbeat.health == Health::OK
 }
@@ -180,7 +98,7 @@ fn wait_for_heartbeat(
     listener.first_heartbeat(since_ns, PATIENCE, wanted).unwrap_or_else(|| {
         let heard = listener.heard();
         let last = heard.words.iter().rev().find_map(|(_, word)| match word {
-            fencepost_guest_tests::bus::Word::Heartbeat(heartbeat) => Some(*heartbeat),
+            Word::Heartbeat(heartbeat) => Some(*heartbeat),
             _ => None,
         });
         let reasons = last.map(|last| names(last.health));
@@ -207,13 +125,26 @@ fn assert_said_in_time(
     since_ns + took.as_nanos() as u64
 }
 
+/// Nothing is free, and the level says that nothing can be told.
 fn assert_nothing_free(listener: &Listener, from_ns: u64, until_ns: u64, what: &str) {
-    let heard = listener.heard();
-    for (at_ns, word) in heard.words.iter().filter(|(at_ns, _)| (from_ns..until_ns).contains(at_ns)) {
-        if let fencepost_guest_tests::bus::Word::Scan(scan) = word {
-            let free = scan.cells.iter().filter(|(_, _, obstacle)| !obstacle).count();
-            assert_eq!(free, 0, "{what}: {free} cells are free in scan {} at {at_ns}", scan.scan_index);
-            assert!(scan.health >= HealthLevel::Blind, "{what}: scan {} is {:?}", scan.scan_index, scan.health);
-        }
+    assert_no_free_cell(listener, from_ns, until_ns, what);
+    for scan in scans_within(&listener.heard(), from_ns, until_ns) {
+        assert!(scan.health >= HealthLevel::Blind, "{what}: scan {} is {:?}", scan.scan_index, scan.health);
     }
+}
+
+fn assert_no_free_cell(listener: &Listener, from_ns: u64, until_ns: u64, what: &str) {
+    for scan in scans_within(&listener.heard(), from_ns, until_ns) {
+        let free = scan.cells.iter().filter(|(_, _, obstacle)| !obstacle).count();
+        assert_eq!(free, 0, "{what}: {free} cells are free in scan {}", scan.scan_index);
+    }
+}
+
+fn scans_within(heard: &Heard, from_ns: u64, until_ns: u64) -> impl Iterator<Item = &HeardScan> {
+    heard.words.iter().filter(move |(at_ns, _)| (from_ns..until_ns).contains(at_ns)).filter_map(
+        |(_, word)| match word {
+            Word::Scan(scan) => Some(scan),
+            _ => None,
+        },
+    )
 }
