@@ -108,8 +108,8 @@ pub use config::{FrameFormat, WireConfig, WireSettings, check_geometry};
 pub use encoder::{EncodeReport, OutputFull, Scan, ScanEncoder, Status};
 pub use frame::{Frame, MAX_DATA};
 pub use load::{
-    FIXED_FRAMES_PER_SCAN, HEARTBEAT_RATE_HZ, MAX_HEARTBEAT_RATE_HZ, VEHICLE_MOTION_RATE_HZ, classic_frame_bits, fd_frame_bits,
-    max_bits_per_scan, max_bits_per_second, max_frames_per_scan, max_load_permille,
+    FIXED_FRAMES_PER_SCAN, HEARTBEAT_RATE_HZ, MAX_HEARTBEAT_RATE_HZ, VEHICLE_MOTION_RATE_HZ, classic_frame_bits,
+    fd_frame_bits, max_bits_per_scan, max_bits_per_second, max_frames_per_scan, max_load_permille,
 };
 pub use message::{
     AGE_STEP_MS, CELL_INDEX_MAX, CELL_INDEX_MIN, CellsRepr, EndRepr, GroundRepr, HeaderRepr, HeartbeatRepr,

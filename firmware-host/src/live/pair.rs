@@ -106,6 +106,10 @@ impl<C: Camera> PairLoop<'_, C> {
                 Ok(pair.missed)
             });
             place.count_alive();
+            while let Some(warning) = self.camera.take_warning() {
+                let text = format_args!("pair {}: {warning}", self.name);
+                self.events.tell(monotonic_ns(), Severity::Warning, text);
+            }
             let found = match result {
                 Ok(None) => {
                     place.fail(Trouble::Ended);

@@ -121,6 +121,15 @@ impl Camera for RigCamera {
             },
         }
     }
+
+    fn take_warning(&mut self) -> Option<String> {
+        match self {
+            #[cfg(all(feature = "v4l", target_os = "linux"))]
+            Self::V4l2(camera) => camera.take_warning(),
+            Self::Recording(played) => played.camera.take_warning(),
+            Self::Scene(_) => None,
+        }
+    }
 }
 
 impl CameraError for RigCameraError {

@@ -168,11 +168,13 @@ impl CameraSettings {
         };
         range("width", Some(self.width.into()), 16.0, 8192.0, " px");
         range("height", Some(self.height.into()), 16.0, 8192.0, " px");
-        range("rate_hz", self.rate_hz.map(f64::from), 0.1, 1000.0, " Hz");
+        // Slower cameras do not see an obstacle in time; and a loop that waits longer than this for one picture cannot be stopped in
+        // time either.
+        range("rate_hz", self.rate_hz.map(f64::from), 1.0, 1000.0, " Hz");
         // With one buffer held and one being filled none is left for the picture in between.
         range("buffers", Some(self.buffers.into()), 3.0, 32.0, "");
         range("pairing_tolerance_ms", Some(self.pairing_tolerance_ms.into()), 0.0, 1000.0, " ms");
-        range("timeout_ms", self.timeout_ms.map(f64::from), 1.0, 60_000.0, " ms");
+        range("timeout_ms", self.timeout_ms.map(f64::from), 1.0, 4000.0, " ms");
         range("exposure_us", self.exposure_us.map(f64::from), 1.0, 10.0e6, " us");
         if let Some(timeout_ms) = self.timeout_ms
             && let Some(period_ms) = self.rate_hz.filter(|rate| *rate >= 0.1).map(|rate_hz| 1000.0 / rate_hz)

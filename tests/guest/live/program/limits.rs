@@ -28,7 +28,7 @@ fn pictures_that_grow_old_are_said_before_the_camera_gives_up() {
     let _loopback = Loopback::load();
     let listener = Listener::open(bus.name());
     let feeder = Feeder::start(open_writers(), PERIOD);
-    let camera = format!("{LOOPBACK}\ntimeout_ms = 5000");
+    let camera = format!("{LOOPBACK}\ntimeout_ms = 4000");
     let program = start(&rig(bus.name(), settings, &camera));
     wait_until_healthy(&listener, &program, 0);
     // It writes its last pair before it ends.
@@ -87,7 +87,7 @@ fn a_map_that_does_not_fit_is_said_as_long_as_it_does_not() {
     let _loopback = Loopback::load();
     let listener = Listener::open(bus.name());
     let feeder = Feeder::start(open_writers(), PERIOD);
-    let camera = format!("{LOOPBACK}\ntimeout_ms = 5000");
+    let camera = format!("{LOOPBACK}\ntimeout_ms = 4000");
     let program = start(&rig(bus.name(), settings, &camera));
     let truncated = |heartbeat: &fencepost_core::wire::HeartbeatRepr| heartbeat.health.has(HealthReason::MapTruncated);
     wait_for_heartbeat(&listener, &program, "map_truncated", 0, truncated);
@@ -122,7 +122,7 @@ fn a_picture_that_freezes_fifty_times_costs_nothing() {
     let _loopback = Loopback::load();
     let listener = Listener::open(bus.name());
     let feeder = Feeder::start_small(SMALL, SHORT);
-    let program = start(&rig_with(bus.name(), settings, &format!("{camera}\ntimeout_ms = 5000"), calibration));
+    let program = start(&rig_with(bus.name(), settings, &format!("{camera}\ntimeout_ms = 4000"), calibration));
     let frozen = |heartbeat: &fencepost_core::wire::HeartbeatRepr| heartbeat.health.has(HealthReason::FrozenPicture);
     wait_for_heartbeat(&listener, &program, "scans", 0, |heartbeat| {
         heartbeat.last_scan.is_some() && !frozen(heartbeat)

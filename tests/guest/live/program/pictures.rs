@@ -37,7 +37,7 @@ fn spoilt_pictures_are_said_and_nothing_is_free_in_them() {
     let _loopback = Loopback::load();
     let listener = Listener::open(bus.name());
     let feeder = Feeder::start(open_writers(), PERIOD);
-    let camera = format!("{LOOPBACK}\ntimeout_ms = 5000");
+    let camera = format!("{LOOPBACK}\ntimeout_ms = 4000");
     let program = start(&rig(bus.name(), SETTINGS, &camera));
     let mut since_ns = 0;
     for (reason, spoil) in SPOILT {
@@ -61,7 +61,7 @@ fn pictures_of_which_nothing_can_be_made_are_said() {
     let _loopback = Loopback::load();
     let listener = Listener::open(bus.name());
     let feeder = Feeder::start(open_writers(), PERIOD);
-    let camera = format!("{LOOPBACK}\ntimeout_ms = 5000");
+    let camera = format!("{LOOPBACK}\ntimeout_ms = 4000");
     let settings = format!("{SETTINGS}[ground]\nhold_frames = 2\n");
     let program = start(&rig(bus.name(), &settings, &camera));
     let spoilt: [(HealthReason, Rewrite, u32); 4] = [
