@@ -64,9 +64,9 @@ pub struct PairingCounts {
     pub pairs: u64,
     /// Pictures that came, but had no partner.
     pub unpaired: u64,
-    /// Pictures that never came, told by gaps in their numbers, or came damaged.
+    /// Pictures that never came although there was room for them, told by gaps in their numbers, or came damaged.
     pub lost: u64,
-    /// Pictures that were passed over because a newer one had come.
+    /// Pictures that were passed over because a newer one had come, or the caller was away for longer than there was room.
     pub passed_over: u64,
     /// Times of exposure that were before the one of the same camera's last picture, or more than ten seconds after it.
     pub jumps: u64,
@@ -83,6 +83,10 @@ pub struct Pairing<T> {
     left: Stream<T>,
     right: Stream<T>,
     next: u32,
+    /// How long the caller was away, in this call and the one before, nanoseconds.
+    away_ns: [u64; 2],
+    /// Pictures for which the driver has room meanwhile.
+    room: u32,
     /// Pictures lost in front of a pair that turned out to be damaged.
     carried: u32,
     counts: PairingCounts,
@@ -107,6 +111,8 @@ impl<T> Pairing<T> {
             left: Stream::new(),
             right: Stream::new(),
             next: 0,
+            away_ns: [0; 2],
+            room: 0,
             carried: 0,
             counts: PairingCounts { pairs: 0, unpaired: 0, lost: 0, passed_over: 0, jumps: 0, restarts: 0, apart: 0 },
         }
@@ -123,6 +129,14 @@ impl<T> Pairing<T> {
             Side::Left => self.left.held.is_some(),
             Side::Right => self.right.held.is_some(),
         }
+    }
+
+    /// Notes that the caller was away for `away_ns`, while the drivers had room for `room` pictures. When the room is used up
+    /// they pass pictures over on the caller's behalf, which is no loss.
+    pub const fn away(&mut self, away_ns: u64, room: u32) {
+        // The gap is behind the pictures for which there was room, of which the newest fills one call.
+        self.away_ns = [away_ns, self.away_ns[0]];
+        self.room = room;
     }
 
     /// Takes a picture. Gives the pair that it completes; every picture that will never have a partner goes to `drop`.
@@ -188,6 +202,7 @@ impl<T> Pairing<T> {
     /// the pairs go on.
     pub fn restart(&mut self, drop: impl FnMut(Side, T)) {
         self.release(drop);
+        self.away_ns = [0; 2];
         for stream in [&mut self.left, &mut self.right] {
             stream.last_ns = None;
             stream.numbers = Sequence::new();
@@ -207,14 +222,24 @@ impl<T> Pairing<T> {
     }
 
     fn note(&mut self, side: Side, stamp: Stamp) {
-        let stream = self.stream(side);
+        let (away_ns, room) = (self.away_ns[0].max(self.away_ns[1]), self.room);
+        let stream = match side {
+            Side::Left => &mut self.left,
+            Side::Right => &mut self.right,
+        };
         let now_ns = stamp.timestamp_ns;
         let jumped = |last_ns: u64| now_ns < last_ns || now_ns - last_ns > AHEAD_NS;
-        let jumped = stream.last_ns.replace(now_ns).is_some_and(jumped);
+        let before_ns = stream.last_ns.replace(now_ns);
         let step = stream.numbers.next(stamp.sequence);
-        stream.lost = stream.lost.saturating_add(step.lost);
-        self.counts.jumps += u64::from(jumped);
-        self.counts.lost += u64::from(step.lost);
+        let period_ns = before_ns.map_or(0, |before_ns| now_ns.saturating_sub(before_ns) / (u64::from(step.lost) + 1));
+        let no_room = period_ns > 0 && away_ns > period_ns.saturating_mul(room.into());
+        let (total, count) = match no_room {
+            true => (&mut stream.passed_over, &mut self.counts.passed_over),
+            false => (&mut stream.lost, &mut self.counts.lost),
+        };
+        *total = total.saturating_add(step.lost);
+        *count += u64::from(step.lost);
+        self.counts.jumps += u64::from(before_ns.is_some_and(jumped));
         self.counts.restarts += u64::from(step.restarted);
     }
 

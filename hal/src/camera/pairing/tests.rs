@@ -249,3 +249,60 @@ fn a_pair_that_is_spoilt_counts_as_lost_with_the_next_one() {
     }
     assert_eq!((pairing.counts().pairs, pairing.counts().lost), (2, 4));
 }
+
+/// A driver with four buffers, one of which is lent to a caller who takes `busy` periods for each pair; the cameras lose
+/// pictures by themselves where `lost` says.
+fn slow_caller(busy: u64, lost: impl Fn(u64) -> bool) -> (PairingCounts, u32) {
+    const ROOM: usize = 3;
+    let mut pairing = Pairing::new(TOLERANCE_NS);
+    let (mut now, mut missed, mut first) = (0_u64, 0, None);
+    let mut waiting: Vec<u64> = Vec::new();
+    for call in 0..50 {
+        // While the caller is busy the driver fills what room it has.
+        for moment in now..now + busy {
+            if waiting.len() < ROOM && !lost(moment) {
+                waiting.push(moment);
+            }
+        }
+        now += busy;
+        if call > 0 {
+            pairing.away(busy * PERIOD_NS, ROOM as u32);
+        }
+        if waiting.is_empty() {
+            now = (now..).find(|moment| !lost(*moment)).unwrap();
+            waiting.push(now);
+            now += 1;
+        }
+        let newest = waiting.pop().unwrap();
+        let stamp = |moment: u64| Stamp { timestamp_ns: (moment + 1) * PERIOD_NS, sequence: moment as u32 };
+        for side in [Side::Left, Side::Right] {
+            waiting.iter().for_each(|moment| pairing.pass_over(side, stamp(*moment)));
+        }
+        waiting.clear();
+        assert_eq!(pairing.push(Side::Left, stamp(newest), newest, |_, _| ()), None);
+        let pair = pairing.push(Side::Right, stamp(newest), newest, |_, _| ()).unwrap();
+        missed += pair.missed;
+        // Every moment since the first picture has its number, whatever became of it.
+        let first = *first.get_or_insert(newest - u64::from(pair.sequence));
+        assert_eq!(first + u64::from(pair.sequence), newest);
+    }
+    (pairing.counts(), missed)
+}
+
+#[test]
+fn what_a_driver_cannot_keep_for_a_caller_who_is_away_is_no_loss() {
+    for busy in 4..40 {
+        let (counts, missed) = slow_caller(busy, |_| false);
+        assert_eq!((counts.lost, missed), (0, 0), "{busy} periods");
+        assert!(counts.passed_over > 0);
+    }
+}
+
+#[test]
+fn what_is_lost_though_there_was_room_is_a_loss() {
+    for busy in 0..3 {
+        let (counts, missed) = slow_caller(busy, |moment| moment % 7 == 5);
+        assert!(counts.lost > 0 && u64::from(missed) == counts.lost, "{busy} periods: {counts:?}");
+        assert_eq!(slow_caller(busy, |_| false).0.lost, 0);
+    }
+}

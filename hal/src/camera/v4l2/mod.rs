@@ -33,6 +33,12 @@ use times::OddTimes;
 /// Time between two attempts to open a device that is gone, nanoseconds.
 const RETRY_NS: u64 = 100_000_000;
 
+/// Attempts that follow each other so soon; afterwards the time between two doubles, up to [`LONGEST_RETRY_NS`].
+const QUICK_RETRIES: u32 = 5;
+
+/// A device that could be opened in vain over and over is left alone for so long, nanoseconds.
+const LONGEST_RETRY_NS: u64 = 1_000_000_000;
+
 /// A device that delivers nothing for so long is opened again: some come to life by that. Nanoseconds.
 const STALL_NS: u64 = 2_000_000_000;
 
@@ -49,6 +55,8 @@ pub struct V4l2Camera {
     open: Option<Open>,
     opened_before: bool,
     retry_ns: u64,
+    /// Times that the devices were opened, or one of them, without a pair of pictures since.
+    in_vain: u32,
     /// Since when the next pair is waited for.
     waiting_since_ns: Option<u64>,
     pairing: Pairing<Frame>,
@@ -104,6 +112,7 @@ impl V4l2Camera {
             open: None,
             opened_before: false,
             retry_ns: 0,
+            in_vain: 0,
             waiting_since_ns: None,
             pairing: Pairing::new(settings.pairing_tolerance_ns()),
             said: PairingCounts::default(),
@@ -140,7 +149,12 @@ impl V4l2Camera {
         if self.open.is_none() {
             let mut warnings = Vec::new();
             let opened = Open::new(&self.settings, [&self.left, &self.right], self.layout, &mut warnings);
-            self.retry_ns = monotonic_ns().saturating_add(RETRY_NS);
+            // To find that a device is not there costs nothing and disturbs nobody.
+            self.in_vain = match &opened {
+                Err(error) if matches!(error.problem, V4l2Problem::Absent) => 0,
+                _ => self.in_vain.saturating_add(1),
+            };
+            self.retry_ns = monotonic_ns().saturating_add(retry_ns(self.in_vain));
             let open = opened.map_err(|error| if self.opened_before { still_lost(error) } else { error })?;
             // What cannot be set was said the first time.
             if !std::mem::replace(&mut self.opened_before, true) {
@@ -186,7 +200,12 @@ impl V4l2Camera {
     /// pictures are passed over, except where every pair is wanted.
     fn begin(&mut self) -> Result<(), V4l2Error> {
         match &mut self.open {
-            Some(open) if self.settings.newest_only => open.pass_over_waiting(&mut self.pairing),
+            Some(open) if self.settings.newest_only => {
+                let away_ns = self.waiting_since_ns.map_or(0, |since_ns| monotonic_ns().saturating_sub(since_ns));
+                // One of the buffers is lent.
+                self.pairing.away(away_ns, self.settings.buffers.saturating_sub(1));
+                open.pass_over_waiting(&mut self.pairing)
+            }
             _ => Ok(()),
         }
     }
@@ -300,6 +319,7 @@ impl Camera for V4l2Camera {
             if result.is_err() {
                 self.pairing.spoilt(&pair);
             }
+            self.in_vain = if result.is_ok() { 0 } else { self.in_vain };
             // A pair that was seen is a success; if a buffer is not taken back, the next call finds out why.
             match open.put_back(pair_frames(&pair, self.layout)) {
                 Err(error) if result.is_err() => Err(error),
@@ -331,6 +351,10 @@ impl Open {
         layout: Option<PackedLayout>,
         warnings: &mut Vec<String>,
     ) -> Result<Self, V4l2Error> {
+        // While one of two is away, the other one is not opened in vain.
+        for path in [left, right] {
+            std::fs::metadata(path).map_err(|error| V4l2Error::open(path, error))?;
+        }
         let left = Lens::new(left, settings, warnings)?;
         let right = match layout {
             None => Some(Lens::new(right, settings, warnings)?),
@@ -483,6 +507,12 @@ impl std::fmt::Debug for V4l2Camera {
     }
 }
 
+/// Time until the next attempt, after so many in vain.
+fn retry_ns(in_vain: u32) -> u64 {
+    let doublings = in_vain.saturating_sub(QUICK_RETRIES).min(8);
+    (RETRY_NS << doublings).min(LONGEST_RETRY_NS)
+}
+
 fn odd_times(device: &Path, odd: OddTimes) -> String {
     format!(
         "{}: {}; the time when a picture arrives stands in, so that the pairing of left and right and the age of the cells are \
@@ -538,6 +568,23 @@ mod tests {
         // Five calls of 20 ms fill the time between two attempts.
         assert!((1..=4).contains(&tried), "tried {tried} times in twelve calls");
         assert!(!camera.is_open() && camera.formats().is_none());
+    }
+
+    #[test]
+    fn while_one_device_is_away_the_other_is_not_opened() {
+        // The one that is there would say that it is no camera, once it is opened.
+        for (left, right) in [("/dev/null", "/nowhere/right"), ("/nowhere/left", "/dev/null")] {
+            let error = V4l2Camera::open(&CameraSettings::two(left, right, 640, 480)).unwrap_err();
+            assert!(matches!(error.problem, V4l2Problem::Absent), "{error}");
+            assert!(error.device.starts_with("/nowhere"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_device_that_is_opened_in_vain_is_left_alone_for_longer_and_longer_up_to_a_second() {
+        let waits: Vec<u64> = (1..12).map(|in_vain| retry_ns(in_vain) / 1_000_000).collect();
+        assert_eq!(waits, [100, 100, 100, 100, 100, 200, 400, 800, 1000, 1000, 1000]);
+        assert_eq!(retry_ns(u32::MAX), LONGEST_RETRY_NS);
     }
 
     #[test]

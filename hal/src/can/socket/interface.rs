@@ -90,6 +90,11 @@ pub(super) fn carrier_file(name: &str) -> Option<PathBuf> {
     folder(name).map(|folder| folder.join("carrier"))
 }
 
+/// The file that counts the frames that have gone out.
+pub(super) fn sent_file(name: &str) -> Option<PathBuf> {
+    folder(name).map(|folder| folder.join("statistics/tx_packets"))
+}
+
 /// A name must not lead out of the folder of the interfaces.
 fn folder(name: &str) -> Option<PathBuf> {
     (!name.is_empty() && name != "." && name != ".." && !name.contains('/')).then(|| Path::new(FOLDER).join(name))

@@ -3,6 +3,7 @@
 mod error;
 mod error_frame;
 mod interface;
+mod recovery;
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -20,6 +21,8 @@ use socketcan::{
 
 use super::{BusCondition, BusErrorKind, CanBus, CanFrame, ControllerState};
 use crate::clock::monotonic_ns;
+
+use recovery::Recovery;
 
 pub use error::{SocketCanError, SocketCanProblem};
 pub use interface::{BitTiming, CanInterface, can_interfaces};
@@ -58,6 +61,8 @@ const REMOTE_FLAG: u32 = 0x4000_0000;
 pub struct SocketCan {
     interface: Arc<str>,
     carrier_file: Option<PathBuf>,
+    sent_file: Option<PathBuf>,
+    recovery: Recovery,
     fd: bool,
     /// In the kernel's form, so that opening again takes no memory.
     filters: Vec<u8>,
@@ -108,6 +113,8 @@ impl SocketCan {
         let mut bus = Self {
             interface: interface.into(),
             carrier_file: interface::carrier_file(interface),
+            sent_file: interface::sent_file(interface),
+            recovery: Recovery::default(),
             fd,
             filters: Vec::new(),
             link: Link::Closed { problem: SocketCanProblem::NotThere, retry_ns: 0 },
@@ -167,10 +174,13 @@ impl SocketCan {
         }
     }
 
-    /// Lets go of the interface until the next attempt. Coming up again starts a controller afresh.
+    /// Lets go of the interface until the next attempt. One that was down or gone starts its controller afresh when it comes up
+    /// again; after another error the controller is as it was.
     fn close(&mut self, problem: SocketCanProblem) -> SocketCanError {
         self.link = Link::Closed { problem, retry_ns: monotonic_ns().saturating_add(RETRY_NS) };
-        self.condition.controller = ControllerState::ErrorActive;
+        if matches!(problem.kind(), BusErrorKind::Down | BusErrorKind::Gone) {
+            self.condition.controller = ControllerState::ErrorActive;
+        }
         SocketCanError::new(Arc::clone(&self.interface), problem)
     }
 
@@ -184,10 +194,25 @@ impl SocketCan {
 
     /// Takes note of an error frame.
     fn take_note(&mut self, class: u32, data: &[u8]) {
-        let before = self.condition.controller;
+        let before = self.condition;
         error_frame::take_note(&mut self.condition, class, data);
-        if self.condition.controller == ControllerState::BusOff && before != ControllerState::BusOff {
+        if self.condition.errors != before.errors {
+            self.recovery.told(monotonic_ns());
+        }
+        if self.condition.controller == ControllerState::BusOff && before.controller != ControllerState::BusOff {
             self.bus_off_look_ns = monotonic_ns().saturating_add(BUS_OFF_LOOK_NS);
+        }
+    }
+
+    /// Looks for what a controller may not have told.
+    fn look(&mut self) {
+        self.look_at_carrier();
+        let now_ns = monotonic_ns();
+        if self.recovery.is_due(self.condition.controller, now_ns)
+            && let Some(sent) = self.sent_file.as_deref().and_then(count)
+            && self.recovery.look(sent, now_ns)
+        {
+            self.condition.controller = ControllerState::ErrorActive;
         }
     }
 
@@ -226,7 +251,7 @@ impl CanBus for SocketCan {
             return Err(SocketCanError::new(Arc::clone(&self.interface), SocketCanProblem::FdNotWanted));
         }
         self.ready()?;
-        self.look_at_carrier();
+        self.look();
         let sent = match &self.link {
             Link::Open(socket) => write(socket, frame),
             Link::Closed { problem, .. } => return Err(SocketCanError::new(Arc::clone(&self.interface), *problem)),
@@ -238,7 +263,7 @@ impl CanBus for SocketCan {
     /// 64 error frames; if more wait, the next call reads on.
     fn receive(&mut self) -> Result<Option<(u64, CanFrame)>, SocketCanError> {
         self.ready()?;
-        self.look_at_carrier();
+        self.look();
         for _ in 0..ERROR_FRAMES_PER_CALL {
             let Link::Open(socket) = &self.link else { return Ok(None) };
             let (frame, stamps) = match socket.read_frame_with_timestamps() {
@@ -308,6 +333,14 @@ fn received(frame: &CanAnyFrame) -> Option<CanFrame> {
     }
 }
 
+/// The count in a file of the kernel. Takes no memory.
+fn count(file: &Path) -> Option<u64> {
+    // 64 bits are 20 digits.
+    let mut text = [0; 24];
+    let length = File::open(file).and_then(|mut file| file.read(&mut text)).ok()?;
+    core::str::from_utf8(text.get(..length)?).ok()?.trim_end().parse().ok()
+}
+
 /// Whether the interface has a carrier. Takes no memory.
 fn has_carrier(file: &Path) -> bool {
     let mut text = [0; 1];
@@ -365,6 +398,29 @@ mod tests {
             };
             assert_eq!(received(&there), Some(frame));
         }
+    }
+
+    #[test]
+    fn only_an_interface_that_went_starts_its_controller_afresh() {
+        use SocketCanProblem::{Down, NotAllowed, NotThere, System};
+        for (problem, expected) in [
+            (Down, ControllerState::ErrorActive),
+            (NotThere, ControllerState::ErrorActive),
+            (System(5), ControllerState::BusOff),
+            (NotAllowed, ControllerState::BusOff),
+        ] {
+            let mut bus = SocketCan::new("nothere0", false);
+            bus.condition.controller = ControllerState::BusOff;
+            bus.close(problem);
+            assert_eq!(bus.condition().controller, expected, "{problem:?}");
+            assert!(!bus.is_open());
+        }
+    }
+
+    #[test]
+    fn counts_of_the_kernel_are_read() {
+        assert_eq!(count(Path::new("/nowhere/tx_packets")), None);
+        assert!(count(&interface::sent_file("lo").unwrap()).is_some(), "every interface has it");
     }
 
     #[test]
