@@ -179,9 +179,9 @@ const NEVER: [HealthReason; 8] = [
     HealthReason::Exchanged,
 ];
 
-/// The frame with which a fault begins, and the one with which it ends, where it does.
+/// The frame with which a camera begins to lag, and the one with which it ends where that is looked at.
 const BEGINS: usize = 6;
-const ENDS: usize = 9;
+const ENDS: usize = 8;
 
 impl Sequence {
     fn moving() -> impl Iterator<Item = Self> {
@@ -192,8 +192,8 @@ impl Sequence {
         self.pairs[frame].clone()
     }
 
-    /// Runs with a fault of the pictures from the second frame on, for a few frames, and asserts that `reason` is told by the
-    /// third, and what is `free` from the second on.
+    /// Runs with a fault of the pictures in the second and third frame, and asserts that `reason` is told by the third, and that
+    /// nothing is free from the second on where `level` says so.
     fn finds(
         &self,
         what: &str,
@@ -201,7 +201,7 @@ impl Sequence {
         level: HealthLevel,
         spoil: impl Fn(usize, [Grey; 2]) -> [Grey; 2],
     ) {
-        let seen = self.run(4, |frame| if frame == 0 { self.pair(0) } else { spoil(frame, self.pair(frame)) });
+        let seen = self.run(3, |frame| if frame == 0 { self.pair(0) } else { spoil(frame, self.pair(frame)) });
         let name = &self.name;
         say!("{name}, {what}: {}", seen[2]);
         assert!(!seen[0].health.has(reason), "{name}, {what}: {} before it happens", seen[0]);
@@ -241,7 +241,7 @@ fn undisturbed_recordings_give_no_reason_to_doubt_the_cameras() {
 
 #[test]
 fn undisturbed_scenes_give_no_reason_to_doubt_the_cameras() {
-    let usual = SceneOptions { width: 320, height: 240, focal_px: 262.5, frames: 6, ..SceneOptions::default() };
+    let usual = SceneOptions { width: 320, height: 240, focal_px: 262.5, frames: 4, ..SceneOptions::default() };
     let lens = SceneOptions {
         distortion: Some(SceneOptions::USUAL_DISTORTION),
         misalignment: Some(SceneOptions::USUAL_MISALIGNMENT),
@@ -250,6 +250,7 @@ fn undisturbed_scenes_give_no_reason_to_doubt_the_cameras() {
     for options in
         [usual, lens, SceneOptions { seed: 3, ..usual }, SceneOptions { content: Content::OpenGround, ..usual }]
     {
+        say!("{} frames of {options:?}", options.frames);
         super::cells::for_each_frame(options, |_, frame, detector| {
             let health = detector.detection().health;
             assert!(!NEVER.iter().any(|reason| health.has(*reason)), "{options:?}, frame {frame}: {health:?}");
@@ -260,25 +261,33 @@ fn undisturbed_scenes_give_no_reason_to_doubt_the_cameras() {
 #[test]
 fn a_camera_that_lags_is_found_within_two_frames_and_forgiven() {
     for sequence in Sequence::moving() {
-        let (name, frames) = (&sequence.name, sequence.pairs.len());
-        for (side, lag) in [(0, 1), (1, 1), (0, 2), (1, 2), (0, 5), (1, 5)] {
-            let seen = sequence.run(frames, |frame| {
+        let name = &sequence.name;
+        for (side, lag, is_forgiven) in
+            [(0, 1, false), (1, 1, false), (0, 2, false), (1, 2, true), (0, 5, false), (1, 5, false)]
+        {
+            // No more frames of before than it takes to recognise the picture that is late, and one that is before that.
+            let first = BEGINS - lag - 1;
+            let end = if is_forgiven { sequence.pairs.len().min(ENDS + 6) } else { ENDS };
+            let seen = sequence.run(end - first, |frame| {
+                let frame = first + frame;
                 let mut pair = sequence.pair(frame);
                 if (BEGINS..ENDS).contains(&frame) {
                     pair[side] = sequence.pairs[frame - lag][side].clone();
                 }
                 pair
             });
+            let seen = |frame: usize| &seen[frame - first];
             let which = ["left", "right"][side];
-            say!("{name}, {which} lags by {lag}: {}", seen[BEGINS + 1]);
-            let has = |frame: usize| seen[frame].health.has(HealthReason::BadlyPaired);
-            assert!((0..BEGINS).all(|frame| !has(frame)), "{name}, {which} lags by {lag}: not yet");
-            assert!((BEGINS + 1..ENDS).all(has), "{name}, {which} lags by {lag}: {}", seen[BEGINS + 1]);
-            assert!(seen[BEGINS..ENDS].iter().all(|s| s.free == 0), "{name}, {which} lags by {lag}: free cells");
-            let found = seen[BEGINS + 1].signs.pairing.lag_frames;
+            say!("{name}, frames {first} to {}, {which} lags by {lag}: {}", end - 1, seen(BEGINS + 1));
+            let has = |frame: usize| seen(frame).health.has(HealthReason::BadlyPaired);
+            assert!((first..BEGINS).all(|frame| !has(frame)), "{name}, {which} lags by {lag}: not yet");
+            assert!((BEGINS + 1..ENDS).all(has), "{name}, {which} lags by {lag}: {}", seen(BEGINS + 1));
+            assert!((BEGINS..ENDS).all(|frame| seen(frame).free == 0), "{name}, {which} lags by {lag}: free cells");
+            let found = seen(BEGINS + 1).signs.pairing.lag_frames;
             assert_eq!(i32::from(found), [-1, 1][side] * lag as i32, "{name}, {which} lags by {lag}");
             // Told for some frames more, and then no longer.
-            if let Some(seen) = seen.get(ENDS + 5) {
+            if end > ENDS + 5 {
+                let seen = seen(ENDS + 5);
                 assert!(!seen.health.has(HealthReason::BadlyPaired) && seen.free > 0, "{name}: {seen}");
             }
         }
@@ -341,9 +350,9 @@ fn bad_exposure_is_found_and_nothing_is_free() {
 #[test]
 fn frozen_pictures_are_found_at_once_and_forgiven() {
     for sequence in Sequence::moving().chain(Sequence::read("euroc-room")) {
-        for sides in [[true, false], [false, true], [true, true]] {
+        for (sides, is_forgiven) in [([true, false], false), ([false, true], true), ([true, true], false)] {
             let frozen = 2..4;
-            let seen = sequence.run(10, |frame| {
+            let seen = sequence.run(if is_forgiven { 10 } else { frozen.end }, |frame| {
                 let mut pair = sequence.pair(frame);
                 for side in (0..2).filter(|side| sides[*side] && frozen.contains(&frame)) {
                     pair[side] = sequence.pairs[frozen.start - 1][side].clone();
@@ -352,9 +361,13 @@ fn frozen_pictures_are_found_at_once_and_forgiven() {
             });
             let name = &sequence.name;
             let has = |frame: usize| seen[frame].health.has(HealthReason::FrozenPicture);
+            say!("{name}, {} frames, frozen {sides:?}: {}", seen.len(), seen[2]);
             assert!(!has(0) && !has(1) && has(2) && has(3), "{name}, {sides:?}: {}", seen[2]);
             assert!(seen[2..4].iter().all(|seen| seen.free == 0), "{name}, {sides:?}: free cells");
-            assert!(seen[0].free > 0 && !has(9) && seen[9].free > 0, "{name}, {sides:?}: {}", seen[9]);
+            assert!(seen[0].free > 0, "{name}, {sides:?}: {}", seen[0]);
+            if is_forgiven {
+                assert!(!has(9) && seen[9].free > 0, "{name}, {sides:?}: {}", seen[9]);
+            }
         }
     }
 }
