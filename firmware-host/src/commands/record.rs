@@ -62,6 +62,7 @@ pub fn record_rig(args: &RecordArgs, console: &mut Console) -> Result<Ending, Fa
     let mut said = Instant::now();
     let report = record(&mut camera, &plan, &stop, |event| match event {
         RecordEvent::Trouble(error) => console.event(format_args!("warning: {error}")),
+        RecordEvent::Odd(odd) => console.event(format_args!("warning: {odd}")),
         RecordEvent::Mended => console.event("pictures again"),
         RecordEvent::Status(report) => {
             if said.elapsed() >= Duration::from_secs(2) {

@@ -15,7 +15,10 @@ pub use report::{RecordEnd, RecordReport};
 
 use std::{
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
     time::{Duration, Instant},
 };
@@ -27,7 +30,7 @@ use fencepost_hal::{
 };
 
 use crate::error::Failure;
-use queue::{Filler, Offer, Stored, queue};
+use queue::{Filler, Next, Offer, Stored, queue};
 
 /// How often it is said how it goes, here and in `record.json`.
 const STATUS: Duration = Duration::from_secs(1);
@@ -65,6 +68,8 @@ pub enum RecordEvent<'a> {
     Trouble(&'a dyn std::error::Error),
     /// The camera delivers again.
     Mended,
+    /// The camera has found something odd.
+    Odd(&'a str),
     /// How it goes.
     Status(&'a RecordReport),
 }
@@ -87,9 +92,11 @@ pub fn record<C: Camera>(
     let mut report = RecordReport::new(&plan.pair);
     report.save(&plan.folder)?;
     let failed = AtomicBool::new(false);
+    let latest = Mutex::new(None);
     let end = thread::scope(|scope| {
-        let disk = scope.spawn(|| write_all(writer, stored, &failed));
-        let mut camera_loop = CameraLoop { plan, stop, disk_failed: &failed, filler, report: &mut report };
+        let disk = scope.spawn(|| write_all(writer, stored, &latest, &failed));
+        let mut camera_loop =
+            CameraLoop { plan, stop, disk_failed: &failed, filler, latest: &latest, report: &mut report };
         let end = camera_loop.run(camera, &mut observe);
         // The writer ends when it has written what is left.
         drop(camera_loop);
@@ -117,6 +124,8 @@ struct CameraLoop<'a> {
     stop: &'a AtomicBool,
     disk_failed: &'a AtomicBool,
     filler: Filler,
+    /// For the writer.
+    latest: &'a Mutex<Option<RecordReport>>,
     report: &'a mut RecordReport,
 }
 
@@ -170,12 +179,15 @@ impl CameraLoop<'_> {
                     thread::sleep(LEAST_FAILING.saturating_sub(called.elapsed()));
                 }
             }
+            while let Some(odd) = camera.take_warning() {
+                observe(RecordEvent::Odd(&odd));
+            }
             if last_status.elapsed() >= STATUS {
                 last_status = Instant::now();
                 self.report.seconds = start.elapsed().as_secs_f64();
                 observe(RecordEvent::Status(self.report));
-                // A disk that does not take this does not take the next picture either, and that is told.
-                let _ = self.report.save(&self.plan.folder);
+                // One that is not written yet has been overtaken.
+                *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(self.report.clone());
             }
             self.report.seconds = start.elapsed().as_secs_f64();
         }
@@ -201,9 +213,26 @@ struct Written {
 }
 
 /// The disk's side: writes what comes until nothing more does, or the disk takes no more.
-fn write_all(mut writer: RecordingWriter, stored: Stored, failed: &AtomicBool) -> Written {
+fn write_all(
+    mut writer: RecordingWriter,
+    stored: Stored,
+    latest: &Mutex<Option<RecordReport>>,
+    failed: &AtomicBool,
+) -> Written {
     let mut error = None;
-    while let Some(filled) = stored.next() {
+    loop {
+        let next = stored.next(STATUS);
+        // Taken out first: the camera must not wait for the disk at this lock.
+        let report = latest.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(report) = report {
+            // A disk that does not take this does not take the next picture either, and that is told.
+            let _ = report.save(writer.folder());
+        }
+        let filled = match next {
+            Next::Pair(filled) => filled,
+            Next::NoneYet => continue,
+            Next::Ended => break,
+        };
         let written = filled.view(|pair| writer.write_pair(pair));
         stored.give_back(filled);
         if let Some(Err(wrong)) = written {

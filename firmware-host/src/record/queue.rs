@@ -1,6 +1,9 @@
 //! Pairs of pictures on their way from the camera to the disk, in memory that is taken at the start.
 
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::{
+    sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel},
+    time::Duration,
+};
 
 use fencepost_core::picture::Picture;
 use fencepost_hal::camera::StereoPair;
@@ -30,6 +33,17 @@ pub(super) struct Filler {
 pub(super) struct Stored {
     empty: SyncSender<Filled>,
     filled: Receiver<Filled>,
+}
+
+/// What comes to the disk's end.
+#[derive(Debug)]
+pub(super) enum Next {
+    /// A pair.
+    Pair(Filled),
+    /// Nothing yet.
+    NoneYet,
+    /// The camera's end is gone, and everything is written.
+    Ended,
 }
 
 /// What became of a pair.
@@ -88,9 +102,13 @@ impl Filler {
 }
 
 impl Stored {
-    /// Waits for the next pair; none when the camera's end is gone and everything is written.
-    pub(super) fn next(&self) -> Option<Filled> {
-        self.filled.recv().ok()
+    /// Waits for the next pair, but no longer than `timeout`.
+    pub(super) fn next(&self, timeout: Duration) -> Next {
+        match self.filled.recv_timeout(timeout) {
+            Ok(pair) => Next::Pair(pair),
+            Err(RecvTimeoutError::Timeout) => Next::NoneYet,
+            Err(RecvTimeoutError::Disconnected) => Next::Ended,
+        }
     }
 
     /// Makes room again.
@@ -120,6 +138,8 @@ fn copy(from: &Picture<'_>, to: &mut [u8]) {
 mod tests {
     use super::*;
 
+    const WAIT: Duration = Duration::from_secs(10);
+
     fn offer(filler: &mut Filler, number: u8, size: (usize, usize)) -> Offer {
         // Rows further apart than they are long.
         let pixels: Vec<u8> = (0..size.1 * (size.0 + 3)).map(|i| i as u8 ^ number).collect();
@@ -131,11 +151,12 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_dropped_and_what_fits_comes_out_in_order() {
         let (mut filler, stored) = queue(2, (5, 4));
+        assert!(matches!(stored.next(Duration::ZERO), Next::NoneYet));
         let offers: Vec<Offer> = (0..4).map(|number| offer(&mut filler, number, (5, 4))).collect();
         assert_eq!(offers, [Offer::Taken, Offer::Taken, Offer::Full, Offer::Full]);
         assert_eq!(offer(&mut filler, 9, (5, 3)), Offer::WrongSize);
         for number in 0..2_u8 {
-            let pair = stored.next().unwrap();
+            let Next::Pair(pair) = stored.next(WAIT) else { panic!("nothing comes") };
             pair.view(|pair| {
                 assert_eq!((pair.timestamp_ns, pair.skew_ns, pair.missed), (u64::from(number), 3, 1));
                 for y in 0..4 {
@@ -148,7 +169,8 @@ mod tests {
         }
         assert_eq!(offer(&mut filler, 7, (5, 4)), Offer::Taken);
         drop(filler);
-        assert!(stored.next().is_some() && stored.next().is_none(), "what was taken is not lost when the camera ends");
+        assert!(matches!(stored.next(WAIT), Next::Pair(_)), "what was taken is not lost when the camera ends");
+        assert!(matches!(stored.next(WAIT), Next::Ended));
     }
 
     #[test]

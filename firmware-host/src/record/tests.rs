@@ -48,6 +48,7 @@ fn run<C: Camera>(camera: &mut C, plan: &RecordPlan) -> (RecordReport, Vec<Strin
     let report = record(camera, plan, &AtomicBool::new(false), |event| match event {
         RecordEvent::Trouble(error) => said.push(error.to_string()),
         RecordEvent::Mended => said.push("mended".to_string()),
+        RecordEvent::Odd(odd) => said.push(odd.to_string()),
         RecordEvent::Status(_) => {}
     });
     (report.unwrap(), said)
@@ -172,15 +173,17 @@ impl Camera for Pulled {
 fn times_that_do_not_rise_and_pictures_of_another_size_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(folder.path());
-    let mut camera = Odd { number: 0 };
-    let (report, _) = run(&mut camera, &plan);
+    let mut camera = Odd { number: 0, warned: false };
+    let (report, said) = run(&mut camera, &plan);
     assert_eq!((report.recorded, report.times_not_rising, report.wrong_size), (2, 1, 1));
+    assert_eq!(said, ["the second pair is odd"], "what a camera finds odd on the way is said");
     assert_eq!(replayed(&plan).iter().map(|(time, ..)| *time).collect::<Vec<_>>(), [100, 200]);
 }
 
 /// Four pairs: one good, one before it in time, one too small, one good.
 struct Odd {
     number: usize,
+    warned: bool,
 }
 
 impl Camera for Odd {
@@ -195,6 +198,33 @@ impl Camera for Odd {
         let pair = StereoPair { left: grey, right: grey, timestamp_ns, skew_ns: 0, sequence: 0, missed: 0 };
         Ok(Some(consume(&pair)))
     }
+
+    fn take_warning(&mut self) -> Option<String> {
+        let odd = self.number == 2 && !std::mem::replace(&mut self.warned, true);
+        odd.then(|| "the second pair is odd".to_string())
+    }
+}
+
+#[test]
+fn the_report_is_saved_on_the_way_even_while_no_picture_comes() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = RecordPlan { patience: Duration::from_secs(60), ..plan(folder.path()) };
+    let mut camera = FaultyCamera::new(Slow(scene(100_000)), (64, 48), 0, 1);
+    camera.set_stall(u32::MAX);
+    let (stop, path) = (AtomicBool::new(false), plan.folder.join("record.json"));
+    let mut statuses = 0;
+    let mut saved = serde_json::Value::Null;
+    let report = record(&mut camera, &plan, &stop, |event| {
+        if matches!(event, RecordEvent::Status(_)) {
+            statuses += 1;
+            saved = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+            // The writer looks once a second; that it takes a minute is a mistake.
+            stop.store(saved["no_picture"] != 0 || statuses > 60, Ordering::Relaxed);
+        }
+    });
+    assert_eq!(report.unwrap().end, RecordEnd::Asked);
+    assert!(saved["no_picture"].as_u64().is_some_and(|count| count > 0), "{saved}");
+    assert_eq!(saved["end"], "running");
 }
 
 #[test]
