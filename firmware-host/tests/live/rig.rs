@@ -3,7 +3,7 @@
 use std::{
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
     thread::JoinHandle,
     time::Duration,
@@ -50,7 +50,10 @@ pub(crate) struct OrderedCamera {
 
 /// The other end: gives orders, and knows since when they are carried out.
 #[derive(Clone, Default)]
-pub(crate) struct Orders(Arc<Mutex<(Option<Order>, u64)>>);
+pub(crate) struct Orders {
+    slot: Arc<Mutex<(Option<Order>, u64)>>,
+    delivered: Arc<AtomicU64>,
+}
 
 impl OrderedCamera {
     pub(crate) fn new(memory: MemoryCamera, size: (u32, u32), period: Option<Duration>) -> Self {
@@ -77,8 +80,13 @@ impl Orders {
         (at_ns != u64::MAX).then_some(at_ns)
     }
 
+    /// Pairs that were delivered.
+    pub(crate) fn delivered(&self) -> u64 {
+        self.delivered.load(Ordering::Relaxed)
+    }
+
     fn lock(&self) -> MutexGuard<'_, (Option<Order>, u64)> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.slot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -90,6 +98,7 @@ impl Camera for OrderedCamera {
         let order = orders.lock().0.take();
         let ordered = order.map(|order| order(camera)).is_some();
         camera.next_pair(|pair| {
+            orders.delivered.fetch_add(1, Ordering::Relaxed);
             if ordered {
                 orders.lock().1 = monotonic_ns();
             }

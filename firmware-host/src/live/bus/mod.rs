@@ -250,7 +250,8 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
                 pair.exposure_ns = Some(newest.exposure_ns);
                 pair.fresh = true;
                 self.first_fresh_ns.get_or_insert(now_ns);
-                if newest.missed > 0 || overtaken > 0 {
+                // What was overtaken was seen, and something newer is in its place.
+                if newest.missed > 0 {
                     self.watch.see(HealthReason::MissingPicture, HealthLevel::Degraded, now_ns);
                 }
             }
