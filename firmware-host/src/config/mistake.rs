@@ -283,9 +283,8 @@ fn in_words(message: &str, name: &str) -> (String, String) {
 impl fmt::Display for Mistake {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { line, field, problem, mend } = self;
-        match line {
-            Some(line) => write!(f, "line {line}: ")?,
-            None => {}
+        if let Some(line) = line {
+            write!(f, "line {line}: ")?;
         }
         if !field.is_empty() {
             write!(f, "{field} ")?;
