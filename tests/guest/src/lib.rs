@@ -10,7 +10,7 @@
 //!                                                                       │
 //!         modules, net, device, loopback, vivid: drive ── program: runs ── bus, resources: watch
 //! ```
-//! Everything that changes the machine goes through [`machine::run`], which refuses to work anywhere but in the guest. All
+//! Everything that changes the machine goes through `machine::run`, which refuses to work anywhere but in the guest. All
 //! helpers panic when they fail: they are for tests.
 #![cfg(all(feature = "guest", target_os = "linux"))]
 #![deny(unsafe_code)]
