@@ -116,6 +116,8 @@ pub(super) struct BusLoop<'a, B: CanBus> {
     /// When the first of the detections came that are not sent yet.
     first_fresh_ns: Option<u64>,
     in_flight: Option<InFlight>,
+    /// Scans that were abandoned so far.
+    abandoned_scans: u64,
     latency: Latency,
     report: BusReport,
 }
@@ -172,6 +174,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             start_ns: now_ns,
             first_fresh_ns: None,
             in_flight: None,
+            abandoned_scans: 0,
             latency: Latency::new(),
             report: BusReport::default(),
             settings: settings.clone(),
@@ -329,12 +332,10 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         if encoded.dropped_cells > 0 {
             self.scan_health.raise(HealthReason::MapTruncated, HealthLevel::Degraded);
         }
-        if self.in_flight.take().is_some() {
-            // It is abandoned now: no controller will ever have it.
-            self.late(now_ns);
-            self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
-        }
-        if self.transmitter.scan(&self.frames).is_ok() {
+        let taken = self.transmitter.scan(&self.frames).is_ok();
+        // One that was still on its way is abandoned now.
+        self.look_for_abandoned(now_ns);
+        if taken {
             self.in_flight = Some(InFlight { scan_index, exposure_ns, begun_ns: now_ns });
         }
         let first = self.status.last_scan.is_none();
@@ -392,6 +393,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
                 self.say_bus_trouble(kind, now_ns);
             }
         }
+        self.look_for_abandoned(now_ns);
         if let (Some(finished), Some(flight)) = (pump.scan_finished, self.in_flight)
             && flight.scan_index == finished
         {
@@ -405,6 +407,17 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             }
         }
         pump
+    }
+
+    /// A scan that was abandoned is one that no controller will ever have.
+    fn look_for_abandoned(&mut self, now_ns: u64) {
+        let abandoned = self.transmitter.counters().abandoned_scans;
+        if abandoned > self.abandoned_scans {
+            self.abandoned_scans = abandoned;
+            self.in_flight = None;
+            self.late(now_ns);
+            self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
+        }
     }
 
     fn tell_progress(&self) {
