@@ -219,7 +219,9 @@ fn what_cannot_be_recorded_is_said_with_the_mend() {
     assert!(status == Some(2) && said.contains("cannot be read"), "{said}");
     let two = folder.path().join("two.toml");
     let text = fs::read_to_string(&rig).unwrap();
-    fs::write(&two, format!("{text}{}", text.replace("[[pair]]", "[[pair]]\nname = \"rear\""))).unwrap();
+    let mount = |yaw_deg: u32| format!("\n[pair.mount]\nheight_m = 1.0\nyaw_left_deg = {yaw_deg}\n");
+    let rear = text.replace("[[pair]]", "[[pair]]\nname = \"rear\"");
+    fs::write(&two, format!("{text}{}{rear}{}", mount(0), mount(180))).unwrap();
     let (status, said) = record(&["record"], &two);
     assert!(status == Some(2) && said.contains("--pair NAME, of front, rear"), "{said}");
     let (status, said) = record(&["record", "--queue", "0"], &rig);

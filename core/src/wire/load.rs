@@ -122,9 +122,9 @@ mod tests {
         let classic = checked(WireSettings::CLASSIC);
         assert_eq!(max_frames_per_scan(&classic), 208);
         assert_eq!(max_bits_per_scan(&classic), 208 * 135);
-        assert_eq!(max_load_permille(&classic, 500_000, 10), 581);
-        assert_eq!(max_load_permille(&checked(WireSettings::FD), 500_000, 10), 540);
-        assert_eq!(max_load_permille(&classic, 0, 10), 290_250_000);
+        assert_eq!(max_load_permille(&classic, 500_000, 10), 584);
+        assert_eq!(max_load_permille(&checked(WireSettings::FD), 500_000, 10), 543);
+        assert_eq!(max_load_permille(&classic, 0, 10), 291_600_000);
         assert_eq!(max_load_permille(&classic, 0, u16::MAX), u32::MAX);
     }
 }
