@@ -172,6 +172,8 @@ fn a_camera_whose_pictures_cease_is_waited_for_no_longer_than_asked() {
     let settings = CameraSettings {
         timeout_ms: Some(300),
         pairing_tolerance_ms: 100.0,
+        // Every pair counts here, also the one that waits when the first is asked for.
+        newest_only: false,
         ..CameraSettings::two(loopback::LEFT, loopback::RIGHT, 64, 48)
     };
     let mut camera = V4l2Camera::open(&settings).unwrap();

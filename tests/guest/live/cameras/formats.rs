@@ -86,6 +86,8 @@ fn jpeg_pictures_become_grey() {
         format: Some(PixelFormat::Mjpg),
         timeout_ms: Some(1000),
         pairing_tolerance_ms: 50.0,
+        // There is one pair, and it waits already.
+        newest_only: false,
         ..CameraSettings::two(loopback::LEFT, loopback::RIGHT, WIDTH, HEIGHT)
     };
     let mut camera = V4l2Camera::open(&settings).unwrap();
