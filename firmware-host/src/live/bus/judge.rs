@@ -44,6 +44,11 @@ impl<B: CanBus> BusLoop<'_, B> {
             || now.no_acknowledgement > before.no_acknowledgement
             || now.restarts > before.restarts
             || now.overflows > before.overflows;
+        // It is late from its deadline on, not only when it is through or given up.
+        let deadline_ns = self.deadline_ns();
+        if self.in_flight.is_some_and(|flight| now_ns.saturating_sub(flight.exposure_ns) > deadline_ns) {
+            self.watch.see(HealthReason::Late, HealthLevel::Degraded, now_ns);
+        }
         if rose || now.controller >= ControllerState::ErrorPassive {
             self.watch.see(HealthReason::BusTrouble, HealthLevel::Degraded, now_ns);
         }
