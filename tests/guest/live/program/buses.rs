@@ -134,7 +134,9 @@ fn error_frames_are_understood() {
 fn a_controller_that_stops_to_echo_is_missed() {
     let bus = Interface::virtual_bus("vcan0");
     let listener = Listener::open(bus.name());
-    let program = start(&recorded_rig(bus.name()));
+    // Patient enough for whoever echoes on an emulated machine.
+    let settings = format!("{SETTINGS}echo_timeout_ms = 3000\n");
+    let program = start(&super::recorded_rig(bus.name(), &settings, true));
     wait_until_healthy(&listener, &program, 0);
     let speaker = Speaker::open(bus.name());
     let mut encoder = CommandEncoder::new(Address::default());
