@@ -40,11 +40,6 @@ impl Watch {
     }
 }
 
-/// Both together.
-pub(super) fn joined(a: Health, b: Health) -> Health {
-    Health { level: a.level.max(b.level), reasons: a.reasons | b.reasons }
-}
-
 /// Scans whose time of sending is known. More are not sent within any sensible time-out.
 const SENT: usize = 128;
 

@@ -3,7 +3,7 @@
 use fencepost_core::health::{Health, HealthLevel, HealthReason};
 use fencepost_hal::can::{BusErrorKind, CanBus, ControllerState};
 
-use super::{BusLoop, PairState, Severity, Trouble, joined};
+use super::{BusLoop, PairState, Severity, Trouble};
 
 impl<B: CanBus> BusLoop<'_, B> {
     /// Everything that only the loop can know.
@@ -11,7 +11,7 @@ impl<B: CanBus> BusLoop<'_, B> {
         self.judge_pairs(now_ns);
         self.judge_bus(now_ns);
         self.judge_commands(now_ns);
-        self.status.health = joined(self.scan_health_now(), self.watch.health(now_ns));
+        self.status.health = self.scan_health_now().and(self.watch.health(now_ns));
     }
 
     /// Before the first scan nothing is known.
@@ -20,7 +20,7 @@ impl<B: CanBus> BusLoop<'_, B> {
     }
 
     fn judge_pairs(&mut self, now_ns: u64) {
-        let stale_ns = u64::from(self.settings.stale_ms) * 1_000_000;
+        let stale_ns = self.stale_ns();
         let since_ns = |pair: &PairState| now_ns.saturating_sub(pair.exposure_ns.unwrap_or(self.start_ns));
         let is_stale = |pair: &PairState| since_ns(pair) > stale_ns && pair.trouble != Some(Trouble::Ended);
         // A rig that still sees something with one of its pairs is degraded; what the others do not see is unknown in its map.

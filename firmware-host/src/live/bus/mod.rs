@@ -33,7 +33,7 @@ use super::{
     exchange::{Bell, Place, Trouble},
     latency::{Latency, LatencySummary},
     settings::{MAX_PAIRS, RunSettings},
-    watch::{EchoWatch, Watch, joined},
+    watch::{EchoWatch, Watch},
 };
 use crate::{detector::CELLS, error::Failure};
 
@@ -279,7 +279,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
     /// Joins what the pairs saw and hands it to the transmitter.
     fn scan(&mut self, now_ns: u64) {
         self.first_fresh_ns = None;
-        let stale_ns = u64::from(self.settings.stale_ms) * 1_000_000;
+        let stale_ns = self.stale_ns();
         self.merged.clear();
         let mut oldest_ns: Option<u64> = None;
         let mut oldest_fresh_ns: Option<u64> = None;
@@ -319,7 +319,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         let scan = Scan {
             scan_index,
             age_ns,
-            health: joined(seen, self.watch.health(now_ns)),
+            health: seen.and(self.watch.health(now_ns)),
             geometry: &map.geometry,
             cells: &map.cells,
             sectors: &sectors,
@@ -348,6 +348,10 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         if let Ok(mut progress) = self.shared.progress.try_lock() {
             progress.age_ms = age_ns as f64 * 1.0e-6;
         }
+    }
+
+    fn stale_ns(&self) -> u64 {
+        u64::from(self.settings.stale_ms) * 1_000_000
     }
 
     fn deadline_ns(&self) -> u64 {
