@@ -49,10 +49,20 @@ pub(crate) fn furnish(options: &SceneOptions, ground: &Ground) -> Mesh {
     planter.mesh
 }
 
+/// The ground `aside_m` to the left of the trail on the given [`side`].
+pub(crate) fn spot(ground: &Ground, side: f32, x: f32, aside_m: f32) -> V3 {
+    let y = ground.trail.y(x) + side * aside_m;
+    v3(x, y, ground.height(x, y))
+}
+
+/// -1 where the scene of a seed is the mirror image of the usual one, otherwise 1.
+pub(crate) const fn side(seed: u32) -> f32 {
+    if seed.is_multiple_of(2) { -1.0 } else { 1.0 }
+}
+
 impl<'a> Planter<'a> {
     pub(crate) fn new(ground: &'a Ground, seed: u32) -> Self {
-        let side = if seed.is_multiple_of(2) { -1.0 } else { 1.0 };
-        Self { ground, mesh: Mesh::default(), rng: Rng::new(seed), side }
+        Self { ground, mesh: Mesh::default(), rng: Rng::new(seed), side: side(seed) }
     }
 
     fn rural(&mut self) {
@@ -88,8 +98,7 @@ impl<'a> Planter<'a> {
 
     /// The ground `aside_m` to the left of the trail; to the right in a mirrored scene.
     fn spot(&self, x: f32, aside_m: f32) -> V3 {
-        let y = self.ground.trail.y(x) + self.side * aside_m;
-        v3(x, y, self.ground.height(x, y))
+        spot(self.ground, self.side, x, aside_m)
     }
 
     /// A rock that rises `height_m` above the ground.
