@@ -73,7 +73,7 @@ impl Sight {
     /// The cell of the frame at `to` in which the centre of a cell of the frame at `from` lies, on the ground of the mount.
     fn carry(&self, (i, j): CellNumber, from: &Isometry3<f64>, to: &Isometry3<f64>) -> Option<CellNumber> {
         let (x, y) = self.geometry.centre_m(i, j);
-        let world = from * self.to_camera([x, y, 0.0]).map(f64::from);
+        let world = from * self.in_camera([x, y, 0.0]).map(f64::from);
         let seen = to.inverse_transform_point(&world).map(|metres| metres as f32);
         let [x, y, _] = self.frame.point(seen.into());
         let size = self.geometry.cell_size_m();
@@ -91,7 +91,7 @@ impl Sight {
         let corners = [(-half, -half), (-half, half), (half, -half), (half, half)].map(|(dx, dy)| (x + dx, y + dy));
         let (low_m, high_m) = self.obstacle_heights_m;
         corners.into_iter().all(|(x, y)| {
-            let [top, foot] = [high_m, low_m].map(|z| self.to_camera([x, y, z]));
+            let [top, foot] = [high_m, low_m].map(|z| self.in_camera([x, y, z]));
             let disparity_px = self.pair.disparity_px(foot.z);
             let u = self.pair.cx + self.pair.focal_px * foot.x / foot.z;
             let [v_top, v_foot] = [top, foot].map(|p| self.pair.cy + self.pair.focal_px * p.y / p.z);
@@ -105,7 +105,7 @@ impl Sight {
         })
     }
 
-    fn to_camera(&self, vehicle_m: [f32; 3]) -> Point3<f32> {
+    fn in_camera(&self, vehicle_m: [f32; 3]) -> Point3<f32> {
         let origin = self.frame.origin_m();
         self.frame.to_camera(std::array::from_fn(|k| vehicle_m[k] - origin[k])).into()
     }
