@@ -11,6 +11,8 @@ mod health;
 mod joining;
 mod rover;
 mod slope;
+mod steadiness;
+mod stereoboard;
 
 use std::path::Path;
 
