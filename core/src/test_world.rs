@@ -229,7 +229,7 @@ impl Stages {
         stages.depth.configure(&PAIR, 0, DISPARITIES as u16);
         stages.surfaces.configure(&SurfaceSettings::default(), 320, 240).unwrap();
         stages.ground.configure(ground, &frame, mount.height_m.is_some(), 320 * 240).unwrap();
-        stages.obstacles.configure(obstacles).unwrap();
+        stages.obstacles.configure(obstacles, PAIR.focal_px).unwrap();
         stages
     }
 
@@ -237,7 +237,7 @@ impl Stages {
     pub(crate) fn ground(&mut self, pixels: &[DisparityPixel]) -> Option<GroundPlane> {
         let picture = DisparityPicture::new(pixels, 320);
         self.surfaces.run(picture, &self.depth, &self.rays);
-        self.ground.run(&mut self.surfaces, &mut self.regions, picture)
+        self.ground.run(&mut self.surfaces, &mut self.regions, picture, (&self.depth, &self.rays))
     }
 
     /// All of them: the ground, the obstacles and how many were dropped.
@@ -249,8 +249,7 @@ impl Stages {
         let mut obstacles = heapless::Vec::<_, OBSTACLES, u16>::new();
         let picture = DisparityPicture::new(pixels, 320);
         let Self { surfaces, regions, place, ground: finder, .. } = self;
-        let dropped =
-            self.obstacles.run(surfaces, regions, picture, finder.terrain(), place, &mut obstacles);
+        let dropped = self.obstacles.run(surfaces, regions, picture, finder.terrain(), place, &mut obstacles);
         (ground, obstacles.to_vec(), dropped)
     }
 }

@@ -143,7 +143,7 @@ impl<
         let MatchSettings { min_disparity, disparities, .. } = settings.matching;
         self.depth.configure(&pair, min_disparity, disparities);
         self.ground.configure(&settings.ground, &frame, mount.height_m.is_some(), width * height)?;
-        self.obstacles.configure(&settings.obstacles)?;
+        self.obstacles.configure(&settings.obstacles, pair.focal_px)?;
         self.map.configure(&settings.map, (settings.obstacles.min_height_m, settings.obstacles.clearance_m))?;
         settings.health.check()?;
         self.health = settings.health;
@@ -223,7 +223,7 @@ impl<
         let report = self.surfaces.run(picture, &self.depth, &setup.rays);
 
         probe.enter(Stage::Ground);
-        let ground = self.ground.run(&mut self.surfaces, &mut self.regions, picture);
+        let ground = self.ground.run(&mut self.surfaces, &mut self.regions, picture, (&self.depth, &setup.rays));
         let terrain = self.ground.terrain();
 
         probe.enter(Stage::Obstacles);

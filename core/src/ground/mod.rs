@@ -13,16 +13,13 @@ use terrain::Bend;
 use crate::{
     disparity::DisparityPicture,
     error::ConfigError,
-    geometry::VehicleFrame,
+    geometry::{DepthTable, Rays, VehicleFrame},
     planes::Scatter,
     surfaces::{Regions, Surface, SurfaceClass, Surfaces},
 };
 
 /// Rounds of choosing the surfaces near the plane and fitting it again. The choice settles after two or three.
 const REFINEMENTS: usize = 4;
-
-/// Share of a region's pixels that must lie on the plane for the rest of the region to be ground too.
-const REGION_SHARE: f32 = 0.2;
 
 /// Regions that a plane is grown from, largest first.
 const REGIONS: usize = 3;
@@ -40,8 +37,9 @@ pub struct GroundFinder {
     frame: Option<VehicleFrame>,
     height_known: bool,
     min_support: f32,
-    /// Tangent and cosine of the largest tilt.
+    /// Tangents of the largest tilt and of the steepest ground, cosine of the largest tilt.
     max_slope: f32,
+    terrain_slope: f32,
     least_upright: f32,
     last: Option<GroundPlane>,
     terrain: Terrain,
@@ -56,6 +54,7 @@ impl GroundFinder {
             height_known: false,
             min_support: 0.0,
             max_slope: 0.0,
+            terrain_slope: 0.0,
             least_upright: 0.0,
             last: None,
             terrain: Terrain::new(),
@@ -80,6 +79,7 @@ impl GroundFinder {
         self.min_support = settings.min_support_permille * 1.0e-3 * pixels as f32;
         let max_tilt = settings.max_tilt_deg.to_radians();
         self.max_slope = libm::tanf(max_tilt);
+        self.terrain_slope = libm::tanf(settings.terrain_max_slope_deg.to_radians());
         self.least_upright = libm::cosf(max_tilt);
         self.forget();
         Ok(())
@@ -92,11 +92,12 @@ impl GroundFinder {
 
     /// Finds the ground, or holds that of an earlier frame, gives the surfaces on it their class and follows them with the
     /// terrain. Without ground the terrain is the plane that the mount promises.
-    pub fn run<const PIXELS: usize, const SURFACES: usize>(
+    pub fn run<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
         &mut self,
         surfaces: &mut Surfaces<PIXELS, SURFACES>,
         regions: &mut Regions<SURFACES>,
         picture: DisparityPicture<'_>,
+        geometry: (&DepthTable<DISPARITIES>, &Rays),
     ) -> Option<GroundPlane> {
         let frame = self.frame?;
         regions.join(surfaces, picture, |surface| self.may_be_ground(surface));
@@ -114,9 +115,10 @@ impl GroundFinder {
                 let bend = Bend {
                     patch_m: self.settings.terrain_patch_m,
                     share: self.settings.terrain_share,
-                    max_slope: self.max_slope,
+                    max_slope: self.terrain_slope,
+                    tolerance_m: self.settings.surface_tolerance_m,
                 };
-                self.terrain.fit(plane, surfaces.table(), &bend);
+                self.terrain.fit(plane, surfaces, picture, geometry, &bend);
             }
             None => self.terrain.flatten(GroundPlane::of_mount(&frame)),
         }
@@ -138,14 +140,13 @@ impl GroundFinder {
     ) {
         for root in regions.roots() {
             let table = surfaces.table();
-            let (mut on_plane, mut all) = (0, 0);
+            let mut on_plane = 0;
             for surface in regions.members(root).filter_map(|place| table.get(place)) {
                 if surface.class == SurfaceClass::Horizontal {
-                    all += surface.pixels();
                     on_plane += if self.lies_on(plane, surface) { surface.pixels() } else { 0 };
                 }
             }
-            let grows = on_plane as f32 >= self.min_support && on_plane as f32 >= REGION_SHARE * all as f32;
+            let grows = on_plane as f32 >= self.min_support;
             for place in regions.members(root) {
                 let Some(surface) = surfaces.table_mut().get_mut(place) else { continue };
                 if surface.class == SurfaceClass::Horizontal && (grows || self.lies_on(plane, surface)) {
@@ -161,8 +162,13 @@ impl GroundFinder {
         let reach = if self.height_known { self.settings.height_tolerance_m } else { f32::INFINITY };
         let level = if self.height_known { 0.0 } else { f32::NEG_INFINITY };
         let allowance = reach + self.max_slope * libm::sqrtf(x * x + y * y);
-        let near = x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m;
-        surface.class == SurfaceClass::Horizontal && near && z <= allowance && z >= level - allowance
+        surface.class == SurfaceClass::Horizontal && z <= allowance && z >= level - allowance
+    }
+
+    /// Whether a surface that may be ground is near enough to say something about the plane.
+    fn tells_plane(&self, surface: &Surface) -> bool {
+        let [x, y, _] = surface.points.mean_m;
+        x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m && self.may_be_ground(surface)
     }
 
     /// The plane that the most ground lies on, of those that grow from the largest regions, from the last plane and from
@@ -191,6 +197,7 @@ impl GroundFinder {
                     continue;
                 }
                 let members = regions.members(root).filter_map(|place| table.get(place));
+                let members = members.filter(|surface| self.tells_plane(surface));
                 let region = members.fold(Scatter::default(), |all, surface| all.joined(&self.weighed(surface)));
                 if region.weight < below && largest.is_none_or(|largest| region.weight > largest.weight) {
                     largest = Some(region);
@@ -211,7 +218,7 @@ impl GroundFinder {
             // A first plane may be bent by what is not ground, or come from an earlier frame: it is forgiven more.
             let tolerance = self.settings.fit_tolerance_m * if round == 0 { 2.5 } else { 1.0 };
             let near = |surface: &Surface| plane.height_m(surface.points.mean_m).abs() <= tolerance;
-            let on_it = table.iter().filter(|surface| self.may_be_ground(surface) && near(surface));
+            let on_it = table.iter().filter(|surface| self.tells_plane(surface) && near(surface));
             let mut support = 0;
             let mut points = Scatter::default();
             for surface in on_it {

@@ -24,6 +24,8 @@ pub struct GroundSettings {
     pub corridor_m: f32,
     /// Edge of the patches that the ground is followed with, metres: bends within a patch are not seen.
     pub terrain_patch_m: f32,
+    /// Steepest ground that is followed, degrees: what rises faster stands on it.
+    pub terrain_max_slope_deg: f32,
     /// How much of what is known of the ground in one patch counts in the next: with 0 each patch stands on its own.
     pub terrain_share: f32,
     /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
@@ -43,6 +45,7 @@ impl GroundSettings {
         max_range_m: 0.0,
         corridor_m: 0.0,
         terrain_patch_m: 0.0,
+        terrain_max_slope_deg: 0.0,
         terrain_share: 0.0,
         min_support_permille: 0.0,
         hold_frames: 0,
@@ -61,6 +64,7 @@ impl GroundSettings {
         ConfigError::check("ground.max_range_m", self.max_range_m, 1.0, 1000.0)?;
         ConfigError::check("ground.corridor_m", self.corridor_m, 0.1, 1000.0)?;
         ConfigError::check("ground.terrain_patch_m", self.terrain_patch_m, 0.05, 100.0)?;
+        ConfigError::check("ground.terrain_max_slope_deg", self.terrain_max_slope_deg, 0.0, 60.0)?;
         ConfigError::check("ground.terrain_share", self.terrain_share, 0.0, 0.9)?;
         ConfigError::check("ground.min_support_permille", self.min_support_permille, 0.0, 1000.0)?;
         ConfigError::check("ground.hold_frames", f32::from(self.hold_frames), 0.0, 1000.0)
@@ -77,7 +81,8 @@ impl Default for GroundSettings {
             surface_tolerance_per_m: 0.01,
             max_range_m: 25.0,
             corridor_m: 1.0,
-            terrain_patch_m: 1.0,
+            terrain_patch_m: 0.75,
+            terrain_max_slope_deg: 25.0,
             terrain_share: 0.15,
             min_support_permille: 2.0,
             hold_frames: 10,

@@ -1,14 +1,28 @@
 //! The ground as it bends: a plane and how far the ground lies above it, patch by patch.
 
 use super::GroundPlane;
-use crate::surfaces::{Surface, SurfaceClass};
+use crate::{
+    disparity::DisparityPicture,
+    geometry::{DepthTable, Rays},
+    surfaces::{SurfaceClass, Surfaces},
+};
 
 /// Patches ahead, and to both sides together.
-const AHEAD: usize = 32;
-const ACROSS: usize = 32;
+const AHEAD: usize = 40;
+const ACROSS: usize = 40;
+
+/// Of so many pixels along and across the rows one is looked at.
+const STEP_X: usize = 4;
+const STEP_Y: usize = 2;
 
 /// Pixels that the plane itself counts for under the robot, where the ground is too near to be seen.
-const PLANE_WEIGHT: f32 = 200.0;
+const PLANE_WEIGHT: f32 = 25.0;
+
+/// Pixels that make a patch known.
+const LEAST_WEIGHT: f32 = 4.0;
+
+/// What lies this many tolerances below the ground of the first round is still ground: that round's is never too low by less.
+const LOWER: f32 = 4.0;
 
 /// The ground ahead: the plane, and its deviation from the plane in square patches, linear between their middles.
 ///
@@ -21,6 +35,16 @@ pub struct Terrain {
     patch_m: f32,
     lift_m: [[f32; ACROSS]; AHEAD],
     weight: [[f32; ACROSS]; AHEAD],
+    sum_m: [[f32; ACROSS]; AHEAD],
+}
+
+/// The two rounds in which the ground is followed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Round {
+    /// From the robot outwards, over all that may be ground.
+    Follow,
+    /// Once more, without what rises above it: the mean of a patch is lifted by what stands in it.
+    Trim,
 }
 
 /// How the ground may bend.
@@ -30,8 +54,10 @@ pub(crate) struct Bend {
     pub(crate) patch_m: f32,
     /// How much of what a patch knows counts in the next one.
     pub(crate) share: f32,
-    /// How far ground may rise in a metre away from the robot, metres.
+    /// How far ground may rise or fall in a metre.
     pub(crate) max_slope: f32,
+    /// How far ground may lie off that, metres.
+    pub(crate) tolerance_m: f32,
 }
 
 impl Terrain {
@@ -39,9 +65,10 @@ impl Terrain {
     pub const fn new() -> Self {
         Self {
             plane: GroundPlane::UNSET,
-            patch_m: 0.0,
+            patch_m: 1.0,
             lift_m: [[0.0; ACROSS]; AHEAD],
             weight: [[0.0; ACROSS]; AHEAD],
+            sum_m: [[0.0; ACROSS]; AHEAD],
         }
     }
 
@@ -51,68 +78,107 @@ impl Terrain {
     /// One pass over the patches.
     pub fn flatten(&mut self, plane: GroundPlane) {
         self.plane = plane;
-        self.patch_m = 1.0;
         for lift_m in &mut self.lift_m {
             lift_m.fill(0.0);
         }
     }
 
-    /// The terrain that the surfaces on the ground describe.
+    /// The terrain that the pixels on the ground describe, followed from the robot outwards: what is farther up the picture
+    /// counts if it can be reached from the ground below it. So the bonnet of a car, as level as ground and now and then hanging
+    /// together with it, is none, and a bank is.
     ///
     /// # Bound
-    /// One pass over the table and eight over the patches.
-    pub(crate) fn fit(&mut self, plane: GroundPlane, table: &[Surface], bend: &Bend) {
+    /// Three passes over one pixel in [`STEP_X`] `x` [`STEP_Y`] of the picture, and twelve over the patches.
+    pub(crate) fn fit<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
+        &mut self,
+        plane: GroundPlane,
+        surfaces: &Surfaces<PIXELS, SURFACES>,
+        picture: DisparityPicture<'_>,
+        (depth, rays): (&DepthTable<DISPARITIES>, &Rays),
+        bend: &Bend,
+    ) {
         self.flatten(plane);
         self.patch_m = bend.patch_m;
-        for weight in &mut self.weight {
-            weight.fill(0.0);
+        for round in [Round::Follow, Round::Trim, Round::Trim] {
+            self.begin();
+            for y in (0..picture.height()).rev().step_by(STEP_Y) {
+                for (x, pixel) in picture.row(y).iter().enumerate().step_by(STEP_X) {
+                    if !pixel.has_value() {
+                        continue;
+                    }
+                    let surface = surfaces.surface_at(x, y).filter(|surface| surface.class != SurfaceClass::Vertical);
+                    let Some(surface) = surface else { continue };
+                    let z = depth.distance_m(pixel.steps());
+                    let direction = rays.direction(x as f32, y as f32);
+                    let point: [f32; 3] = core::array::from_fn(|i| rays.origin_m[i] + z * direction[i]);
+                    self.add(round, point, surface.class == SurfaceClass::Ground, bend);
+                }
+            }
+            self.settle(bend.share);
         }
-        for surface in table.iter().filter(|surface| surface.class == SurfaceClass::Ground) {
-            let [x, y, _] = surface.points.mean_m;
-            let [ahead, across] = self.place(x, y);
-            let Some(weight) = patch(&mut self.weight, ahead, across) else { continue };
-            *weight += surface.points.weight;
-            if let Some(sum) = patch(&mut self.lift_m, ahead, across) {
-                *sum += surface.points.weight * plane.height_m(surface.points.mean_m);
+    }
+
+    /// Makes room for the points of a round.
+    fn begin(&mut self) {
+        for patches in [&mut self.weight, &mut self.sum_m] {
+            for row in patches {
+                row.fill(0.0);
             }
         }
         // The plane itself speaks for the ground under the robot.
         for weight in &mut self.weight[0][ACROSS / 2 - 1..=ACROSS / 2] {
             *weight += PLANE_WEIGHT;
         }
-        // Each patch takes in what its neighbours know, fading with the distance: gaps are filled, patches with little support
-        // are held by those around them.
-        spread(&mut self.weight, bend.share);
-        spread(&mut self.lift_m, bend.share);
-        for (lift_m, weight) in self.lift_m.as_flattened_mut().iter_mut().zip(self.weight.as_flattened()) {
-            *lift_m = if *weight > 0.0 { *lift_m / weight } else { 0.0 };
-        }
-        self.limit(bend.max_slope * bend.patch_m);
     }
 
-    /// Cuts off what rises faster than ground does, seen from the robot outwards: the bonnet of a car is as level as ground, and
-    /// hangs together with it now and then.
-    fn limit(&mut self, rise_m: f32) {
-        let diagonal_m = rise_m * core::f32::consts::SQRT_2;
-        for i in 0..AHEAD {
-            for outwards in 0..ACROSS / 2 {
-                for (j, inner) in [(ACROSS / 2 + outwards, -1), (ACROSS / 2 - 1 - outwards, 1)] {
-                    let at = |i: usize, j: isize| self.lift_m.get(i)?.get(usize::try_from(j).ok()?).copied();
-                    let (nearer, inner) = (i.wrapping_sub(1), j as isize + inner);
-                    let limits = [
-                        at(nearer, j as isize).map(|lift_m| lift_m + rise_m),
-                        at(i, inner).map(|lift_m| lift_m + rise_m),
-                        at(nearer, inner).map(|lift_m| lift_m + diagonal_m),
-                    ];
-                    let limit = limits.into_iter().flatten().fold(f32::NEG_INFINITY, f32::max);
-                    if let Some(lift_m) = patch(&mut self.lift_m, i as f32, j as f32)
-                        && limit > f32::NEG_INFINITY
-                    {
-                        *lift_m = lift_m.min(limit);
-                    }
-                }
-            }
+    /// Makes the terrain of the points of a round. Each patch takes in what its neighbours know, fading with the distance: gaps
+    /// are filled, patches with little support are held by those around them.
+    fn settle(&mut self, share: f32) {
+        spread(&mut self.weight, share);
+        spread(&mut self.sum_m, share);
+        let sums = self.sum_m.as_flattened().iter().zip(self.weight.as_flattened());
+        for (lift_m, (sum_m, weight)) in self.lift_m.as_flattened_mut().iter_mut().zip(sums) {
+            *lift_m = if *weight > 0.0 { *sum_m / weight } else { 0.0 };
         }
+    }
+
+    /// Adds a point to its patch, if ground can be there; `sure` if its surface is known to be ground.
+    fn add(&mut self, round: Round, point: [f32; 3], sure: bool, bend: &Bend) {
+        let [ahead, across] = self.place(point[0], point[1]);
+        if ahead < 0.0 || across < 0.0 || ahead >= AHEAD as f32 || across >= ACROSS as f32 {
+            return;
+        }
+        let (i, j) = (ahead as usize, across as usize);
+        let height_m = self.plane.height_m(point);
+        let accepted = match round {
+            Round::Follow => self.can_be_reached(i, j, point[0], height_m, sure, bend),
+            Round::Trim => {
+                let above_m = height_m - self.lift_m(point[0], point[1]);
+                above_m <= bend.tolerance_m && above_m >= -LOWER * bend.tolerance_m
+            }
+        };
+        if accepted {
+            self.weight[i][j] += 1.0;
+            self.sum_m[i][j] += height_m;
+        }
+    }
+
+    /// Whether a point can be ground, seen from what is known of its patch or of those between it and the robot.
+    fn can_be_reached(&self, i: usize, j: usize, x_m: f32, height_m: f32, sure: bool, bend: &Bend) -> bool {
+        let known = |i: usize, j: usize| {
+            let weight = *self.weight.get(i)?.get(j)?;
+            (weight >= LEAST_WEIGHT).then(|| self.sum_m[i][j] / weight)
+        };
+        let (nearer, inner) = (i.wrapping_sub(1), if j < ACROSS / 2 { j + 1 } else { j.wrapping_sub(1) });
+        let around =
+            known(i, j).or_else(|| known(nearer, j)).or_else(|| known(nearer, inner)).or_else(|| known(i, inner));
+        let (expected_m, distance_m) = match around {
+            Some(lift_m) => (lift_m, self.patch_m),
+            None if sure => (0.0, x_m),
+            None => return false,
+        };
+        let slope = if sure { bend.max_slope } else { 0.0 };
+        (height_m - expected_m).abs() <= bend.tolerance_m + slope * distance_m
     }
 
     /// The plane under the robot.
@@ -146,13 +212,6 @@ impl Default for Terrain {
     fn default() -> Self {
         Self::new()
     }
-}
-
-fn patch(patches: &mut [[f32; ACROSS]; AHEAD], ahead: f32, across: f32) -> Option<&mut f32> {
-    if ahead < 0.0 || across < 0.0 {
-        return None;
-    }
-    patches.get_mut(ahead as usize)?.get_mut(across as usize)
 }
 
 /// Adds to every patch the others, each `share` to the power of its distance, along one side and then along the other.

@@ -26,9 +26,6 @@ pub struct View<'a, const DISPARITIES: usize> {
     pub nearest_m: f32,
 }
 
-/// Error of a disparity that must be expected, px: it makes a plane look rough in proportion to the distance.
-const HEIGHT_NOISE_PX: f32 = 0.3;
-
 /// What the pixels say of one cell.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
@@ -46,12 +43,24 @@ struct Evidence {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Role {
     Nothing,
+    /// Ground, and what may stand on it in the same tile: each pixel speaks for itself.
     Ground,
     Obstacle,
-    /// Ground and object in one surface: each pixel speaks for itself.
-    Mixed,
     Other,
 }
+
+impl Role {
+    const fn of(surface: &Surface) -> Self {
+        match surface.class {
+            SurfaceClass::Obstacle => Self::Obstacle,
+            SurfaceClass::Ground => Self::Ground,
+            _ => Self::Other,
+        }
+    }
+}
+
+/// Distance over which the slope of the ground is measured, metres.
+const SLOPE_STEP_M: f32 = 1.5;
 
 /// Turns the points of surfaces into cells.
 ///
@@ -137,12 +146,13 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let step = view.rays.along_row;
         let rise = |d: [f32; 3]| d[0] * plane.normal[0] + d[1] * plane.normal[1] + d[2] * plane.normal[2];
         let (mut climb, climb_step) = (rise(direction), rise(step));
-        let (mut current, mut role) = (0, Role::Nothing);
+        let (mut current, mut role, mut noise) = (0, Role::Nothing, 0.0);
         for (pixel, &label) in picture.row(y)[x0..end].iter().zip(labels) {
             if label != current {
                 current = label;
                 let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(first + i));
-                role = surface.map_or(Role::Nothing, |surface| self.role(surface, view, camera_height));
+                role = surface.map_or(Role::Nothing, Role::of);
+                noise = surface.map_or(0.0, |surface| self.height_noise_m(surface, view, ground, direction));
             }
             if role != Role::Nothing {
                 let z = view.depth.distance_m(pixel.steps());
@@ -151,13 +161,13 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
                 let height = camera_height + z * climb - ground.lift_m(x, y);
                 let [i, j] = view.place.to_vehicle([x, y]).map(|metres| floor(metres * per_cell));
                 if let Some(evidence) = self.settings.geometry.index(i, j).map(|i| &mut self.evidence[i]) {
-                    let too_high = height > self.settings.free_max_height_m;
+                    let too_high = height > self.settings.free_max_height_m.max(noise);
                     match role {
-                        Role::Obstacle | Role::Mixed if height >= min_height && height <= clearance => {
+                        Role::Obstacle | Role::Ground if height >= min_height.max(noise) && height <= clearance => {
                             evidence.obstacle = evidence.obstacle.saturating_add(1);
                             evidence.height_dm = evidence.height_dm.max((height * 10.0) as u8);
                         }
-                        Role::Ground | Role::Mixed if !too_high => evidence.ground = evidence.ground.saturating_add(1),
+                        Role::Ground if !too_high => evidence.ground = evidence.ground.saturating_add(1),
                         _ if too_high && height <= clearance => evidence.unclear = evidence.unclear.saturating_add(1),
                         _ => {}
                     }
@@ -170,24 +180,24 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         }
     }
 
-    /// What the pixels of a surface count as. A surface within the limits of the ground that is much rougher than the
-    /// matching makes a plane look holds more than ground: a stone and the ground around it, in one tile.
-    fn role<const DISPARITIES: usize>(
+    /// How far the height of a pixel of a surface may be off, metres: the error of its distance, times how fast its ray drops
+    /// towards the ground there. A slope that rises towards the robot is seen at a larger angle, and its heights are less certain.
+    fn height_noise_m<const DISPARITIES: usize>(
         &self,
         surface: &Surface,
         view: &View<'_, DISPARITIES>,
-        camera_height_m: f32,
-    ) -> Role {
+        ground: &Terrain,
+        direction: [f32; 3],
+    ) -> f32 {
         let [x, y, _] = surface.points.mean_m;
-        let range = libm::sqrtf(x * x + y * y);
-        let noise = HEIGHT_NOISE_PX * camera_height_m * range / (view.pair.focal_px * view.pair.baseline_m);
-        let rough = surface.rms_m > self.settings.mixed_rms_m + noise;
-        match surface.class {
-            SurfaceClass::Obstacle => Role::Obstacle,
-            SurfaceClass::Ground if rough => Role::Mixed,
-            SurfaceClass::Ground => Role::Ground,
-            _ => Role::Other,
-        }
+        let half = 0.5 * SLOPE_STEP_M;
+        let slope_ahead = (ground.lift_m(x + half, y) - ground.lift_m(x - half, y)) / SLOPE_STEP_M;
+        let slope_aside = (ground.lift_m(x, y + half) - ground.lift_m(x, y - half)) / SLOPE_STEP_M;
+        let [nx, ny, nz] = ground.plane().normal;
+        let drop = direction[0] * (nx - slope_ahead) + direction[1] * (ny - slope_aside) + direction[2] * nz;
+        let range_square = x * x + y * y;
+        let distance_noise = self.settings.height_noise_px * range_square / (view.pair.focal_px * view.pair.baseline_m);
+        distance_noise * drop.abs()
     }
 
     /// What the votes make of a cell.

@@ -20,9 +20,9 @@ pub struct MapSettings {
     pub free_min_pixels: u16,
     /// Pixels above this height speak against a free cell, metres.
     pub free_max_height_m: f32,
-    /// Ground that lies off its plane by more than this, root mean square, metres, holds something that stands on it: its
-    /// pixels are told by their own height.
-    pub mixed_rms_m: f32,
+    /// Error of a disparity that must be expected at worst, px: what is not higher above the ground than this makes it is not told
+    /// from the ground.
+    pub height_noise_px: f32,
     /// Cells farther away from the camera are not told, metres.
     pub max_range_m: f32,
     /// Width of each of the sectors around straight ahead, degrees; 18 is a full circle.
@@ -38,7 +38,7 @@ impl MapSettings {
         free_cover: 0.0,
         free_min_pixels: 0,
         free_max_height_m: 0.0,
-        mixed_rms_m: 0.0,
+        height_noise_px: 0.0,
         max_range_m: 0.0,
         sector_width_deg: 0.0,
     };
@@ -64,7 +64,7 @@ impl MapSettings {
         ConfigError::check("map.free_cover", self.free_cover, 0.0, 1.0)?;
         ConfigError::check("map.free_min_pixels", f32::from(self.free_min_pixels), 1.0, 10_000.0)?;
         ConfigError::check("map.free_max_height_m", self.free_max_height_m, 0.01, 2.0)?;
-        ConfigError::check("map.mixed_rms_m", self.mixed_rms_m, 0.0, 2.0)?;
+        ConfigError::check("map.height_noise_px", self.height_noise_px, 0.0, 16.0)?;
         ConfigError::check("map.max_range_m", self.max_range_m, 0.1, 1000.0)?;
         ConfigError::check("map.sector_width_deg", self.sector_width_deg, 0.5, 18.0)
     }
@@ -74,12 +74,12 @@ impl Default for MapSettings {
     fn default() -> Self {
         Self {
             geometry: MapGeometry::default(),
-            obstacle_cover: 0.05,
+            obstacle_cover: 0.1,
             obstacle_min_pixels: 8,
             free_cover: 0.03,
             free_min_pixels: 4,
             free_max_height_m: 0.2,
-            mixed_rms_m: 0.03,
+            height_noise_px: 0.9,
             max_range_m: 30.0,
             sector_width_deg: SectorDistances::WIDTH_DEG,
         }

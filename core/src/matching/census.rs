@@ -20,16 +20,7 @@ pub(super) fn codes(rows: [&[u8]; ROWS], out: &mut [u8]) {
     let Some(inner) = width.checked_sub(2 * REACH) else { return };
     let [top, upper, _, middle, _, lower, bottom] = rows;
     // Slices of one length, one for each neighbour, so that the loop runs without checks.
-    let neighbours = [
-        (upper, 1),
-        (upper, 5),
-        (lower, 1),
-        (lower, 5),
-        (middle, 0),
-        (middle, 6),
-        (top, 3),
-        (bottom, 3),
-    ];
+    let neighbours = [(upper, 1), (upper, 5), (lower, 1), (lower, 5), (middle, 0), (middle, 6), (top, 3), (bottom, 3)];
     let centre = &middle[REACH..REACH + inner];
     let out = &mut out[REACH..REACH + inner];
     for (bit, (row, x)) in neighbours.into_iter().enumerate() {

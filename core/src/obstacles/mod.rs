@@ -60,21 +60,23 @@ const HALF_LENGTH: f32 = 1.732_050_8;
 /// The joining of regions, and three passes over the table of surfaces.
 pub struct ObstacleFinder {
     settings: ObstacleSettings,
+    focal_px: f32,
 }
 
 impl ObstacleFinder {
     /// A stage that is not configured.
     pub const fn new() -> Self {
-        Self { settings: ObstacleSettings::UNSET }
+        Self { settings: ObstacleSettings::UNSET, focal_px: 0.0 }
     }
 
-    /// Takes settings.
+    /// Takes settings, and the focal length of the pictures, px.
     ///
     /// # Errors
     /// The first setting that cannot be used, named `obstacles.*`.
-    pub fn configure(&mut self, settings: &ObstacleSettings) -> Result<(), ConfigError> {
+    pub fn configure(&mut self, settings: &ObstacleSettings, focal_px: f32) -> Result<(), ConfigError> {
         settings.check()?;
         self.settings = *settings;
+        self.focal_px = focal_px;
         Ok(())
     }
 
@@ -142,6 +144,7 @@ impl ObstacleFinder {
     ) -> Option<Obstacle> {
         let mut all = Scatter::default();
         let mut count = 0u16;
+        let mut area_m2 = 0.0;
         let (mut min_m, mut max_m) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         // The box lies along the vehicle's axes.
         let [ahead, aside] = [[1.0, 0.0], [0.0, 1.0]].map(|axis| place.turn_back(axis));
@@ -150,6 +153,8 @@ impl ObstacleFinder {
             let points = &surface.points;
             all = all.joined(points);
             count = count.saturating_add(1);
+            let pixel_m = range_m(points) / self.focal_px;
+            area_m2 += points.weight * pixel_m * pixel_m;
             let height = ground.height_m(points.mean_m);
             let [x, y] = place.to_vehicle([points.mean_m[0], points.mean_m[1]]);
             let middle = [x, y, height];
@@ -172,7 +177,8 @@ impl ObstacleFinder {
         };
         let high = max_m[2] >= self.settings.min_height_m && min_m[2] <= self.settings.clearance_m;
         let large = length_m.max(max_m[2] - min_m[2]) >= self.settings.min_size_m;
-        (high && large && obstacle.pixels >= u32::from(self.settings.min_pixels)).then_some(obstacle)
+        let seen = obstacle.pixels >= u32::from(self.settings.min_pixels) && area_m2 >= self.settings.min_area_m2;
+        (high && large && seen).then_some(obstacle)
     }
 }
 
@@ -180,6 +186,12 @@ impl Default for ObstacleFinder {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// Distance of the middle of some points on the ground, metres.
+fn range_m(points: &Scatter) -> f32 {
+    let [x, y, _] = points.mean_m;
+    libm::sqrtf(x * x + y * y)
 }
 
 /// Direction and length of the largest extent on the ground: the largest eigenvector of the covariance of x and y.

@@ -15,6 +15,9 @@ pub struct ObstacleSettings {
     pub clearance_m: f32,
     /// An obstacle has at least this many pixels.
     pub min_pixels: u16,
+    /// ... and shows at least this much of itself, square metres: the pixels that take it are fewer the farther away it is, while
+    /// false matches are as large everywhere.
+    pub min_area_m2: f32,
     /// An obstacle is at least this long, wide or high, metres.
     pub min_size_m: f32,
     /// Surfaces farther away take no part, metres: there, what hangs together in the picture may lie far apart.
@@ -28,6 +31,7 @@ impl ObstacleSettings {
         platform_height_m: 0.0,
         clearance_m: 0.0,
         min_pixels: 0,
+        min_area_m2: 0.0,
         min_size_m: 0.0,
         max_range_m: 0.0,
     };
@@ -41,6 +45,7 @@ impl ObstacleSettings {
         ConfigError::check("obstacles.platform_height_m", self.platform_height_m, self.min_height_m, 5.0)?;
         ConfigError::check("obstacles.clearance_m", self.clearance_m, self.min_height_m, 20.0)?;
         ConfigError::check("obstacles.min_pixels", f32::from(self.min_pixels), 0.0, 10_000.0)?;
+        ConfigError::check("obstacles.min_area_m2", self.min_area_m2, 0.0, 10.0)?;
         ConfigError::check("obstacles.min_size_m", self.min_size_m, 0.0, 5.0)?;
         ConfigError::check("obstacles.max_range_m", self.max_range_m, 0.1, 1000.0)
     }
@@ -51,8 +56,9 @@ impl Default for ObstacleSettings {
         Self {
             min_height_m: 0.25,
             platform_height_m: 0.6,
-            clearance_m: 2.2,
+            clearance_m: 2.5,
             min_pixels: 40,
+            min_area_m2: 0.05,
             min_size_m: 0.15,
             max_range_m: 40.0,
         }
