@@ -12,7 +12,7 @@ use crate::{
     disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
     geometry::{DepthTable, Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
-    ground::{GroundFinder, GroundPlane, Terrain},
+    ground::GroundFinder,
     health::{
         self, Content, ContentSigns, Debounce, Exposure, HealthLevel, HealthSettings, RecentPictures, SearchRange,
         Signs,
@@ -224,21 +224,18 @@ impl<
 
         probe.enter(Stage::Ground);
         let ground = self.ground.run(&mut self.surfaces, &mut self.regions, picture);
-        let terrain = match ground {
-            Some(plane) => self.ground.terrain(plane, self.surfaces.table()),
-            None => Terrain::flat(GroundPlane::of_mount(&setup.frame)),
-        };
+        let terrain = self.ground.terrain();
 
         probe.enter(Stage::Obstacles);
         let detection = &mut self.detection;
         let found = &mut detection.obstacles;
         detection.statistics.obstacles_dropped =
-            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &setup.place, found);
+            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, terrain, &setup.place, found);
 
         probe.enter(Stage::Map);
         let Setup { pair, frame, place, rays, nearest_m, .. } = &setup;
         let view = View { pair, frame, place, rays, depth: &self.depth, nearest_m: *nearest_m };
-        self.map.run(&self.surfaces, picture, &view, &terrain, ground.is_some(), &mut detection.map);
+        self.map.run(&self.surfaces, picture, &view, terrain, ground.is_some(), &mut detection.map);
         detection.ground = ground.map(|plane| plane.moved(place));
         detection.statistics.count(picture, report, self.surfaces.table(), &detection.map);
 
@@ -312,7 +309,7 @@ impl<
         let [left_row, right_row] = &mut self.rows;
         let (left_row, right_row) = (&mut left_row[..width], &mut right_row[..width]);
         // The first row that is not at the border of the picture is complete when this many have come.
-        let margin = usize::from(self.matcher.settings().window) / 2 + 1;
+        let [_, margin] = self.matcher.settings().margins();
         let needed = 2 * margin + 1;
         let mut matched = 0;
         for strip in 0..EXCHANGE_ROWS {
