@@ -19,10 +19,7 @@ pub(super) struct Eigenpair {
     pub(super) vector: Vec<f64>,
 }
 
-/// Dimensions of the subspace that is kept at a restart, and that it grows to before the next.
-const SUBSPACE: (usize, usize) = (20, 60);
-
-/// Up to so many nodes the whole matrix is solved: the subspace must be smaller than the matrix.
+/// Up to so many nodes the whole matrix is solved: the solver needs more than the 64 dimensions of its subspace.
 const DENSE: usize = 128;
 
 /// Restarts after which what was found must do.
@@ -37,22 +34,16 @@ const RESTARTS: usize = 200;
 /// rest, `A x - mu x`, is at most `tolerance`.
 ///
 /// # Bound
-/// 200 restarts of 40 products with the matrix each.
+/// 200 restarts of 32 products with the matrix each.
 pub(super) fn smallest(graph: &Graph, count: usize, tolerance: f64) -> Vec<Eigenpair> {
-    let small = graph.len() <= DENSE.max(SUBSPACE.1);
-    if small { smallest_dense(graph, count) } else { smallest_sparse(graph, count, tolerance) }
+    if graph.len() <= DENSE { smallest_dense(graph, count) } else { smallest_sparse(graph, count, tolerance) }
 }
 
 fn smallest_sparse(graph: &Graph, count: usize, tolerance: f64) -> Vec<Eigenpair> {
     let nodes = graph.len();
     let matrix = Averaging { graph, scale: graph.degrees.iter().map(|degree| 1.0 / degree.sqrt()).collect() };
     let start = Col::from_fn(nodes, start_entry);
-    let params = PartialEigenParams {
-        min_dim: SUBSPACE.0,
-        max_dim: SUBSPACE.1,
-        max_restarts: RESTARTS,
-        ..PartialEigenParams::default()
-    };
+    let params = PartialEigenParams { max_restarts: RESTARTS, ..PartialEigenParams::default() };
     let mut memory = MemBuffer::new(partial_self_adjoint_eigen_scratch(&matrix, count, Par::Seq, params));
     let (mut vectors, mut found) = (Mat::zeros(nodes, count), vec![0.0; count]);
     let stack = MemStack::new(&mut memory);

@@ -6,7 +6,7 @@ use fencepost_core::{
     disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
     geometry::DepthTable,
-    ground::{GroundFinder, GroundPlane, Terrain},
+    ground::GroundFinder,
     map::{MapBuilder, SectorDistances, View},
     obstacles::ObstacleFinder,
     surfaces::{Regions, Surfaces},
@@ -78,18 +78,15 @@ impl Stages {
             }
         }
         let ground = self.ground.run(&mut self.surfaces, &mut self.regions, cut);
-        let terrain = match ground {
-            Some(plane) => self.ground.terrain(plane, self.surfaces.table()),
-            None => Terrain::flat(GroundPlane::of_mount(&cuts.frame)),
-        };
+        let terrain = self.ground.terrain();
         let NormalizedCuts { core, pair, frame, place, rays, .. } = cuts;
         let detection = &mut result.detection;
         let found = &mut detection.obstacles;
-        self.obstacles.run(&mut self.surfaces, &mut self.regions, cut, &terrain, place, found);
+        self.obstacles.run(&mut self.surfaces, &mut self.regions, cut, terrain, place, found);
         // The last disparity has no neighbour to interpolate with and is never reported.
         let largest = f32::from(core.matching.min_disparity) + f32::from(core.matching.disparities) - 2.0;
         let view = View { pair, frame, place, rays, depth: &self.depth, nearest_m: pair.distance_m(largest) };
-        self.map.run(&self.surfaces, picture, &view, &terrain, ground.is_some(), &mut detection.map);
+        self.map.run(&self.surfaces, picture, &view, terrain, ground.is_some(), &mut detection.map);
         detection.ground = ground.map(|plane| plane.moved(place));
         detection.sectors = SectorDistances::of(&detection.map, core.map.sector_width_deg);
         result.table = self.surfaces.table().to_vec();
