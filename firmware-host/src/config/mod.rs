@@ -8,7 +8,7 @@ pub use rig::{RecordingSettings, Rig, RigPair, RigSource, SceneSettings, build_s
 
 use std::path::{Path, PathBuf};
 
-use crate::{cli::DetectorArgs, detector, error::Failure};
+use crate::{cli::DetectorArgs, detector, error::Failure, normalized_cuts::NormalizedCutSettings};
 use fencepost_core::{
     error::ConfigError,
     geometry::Mount,
@@ -35,6 +35,8 @@ pub struct Config {
     pub mount: Option<Mount>,
     /// The bus.
     pub wire: WireSettings,
+    /// The detector `normalized-cuts`.
+    pub normalized_cuts: NormalizedCutSettings,
     /// The rig, if the file describes one.
     pub rig: Rig,
     /// The file that it was read from.
@@ -42,8 +44,21 @@ pub struct Config {
 }
 
 /// The sections of a configuration file.
-const SECTIONS: [&str; 12] =
-    ["matching", "validate", "surfaces", "ground", "obstacles", "map", "health", "mount", "wire", "bus", "run", "pair"];
+const SECTIONS: [&str; 13] = [
+    "matching",
+    "validate",
+    "surfaces",
+    "ground",
+    "obstacles",
+    "map",
+    "health",
+    "normalized_cuts",
+    "mount",
+    "wire",
+    "bus",
+    "run",
+    "pair",
+];
 
 impl Config {
     /// Reads the file that the command line names, if it names one, and puts the command line's own settings over it.
@@ -146,12 +161,15 @@ impl Config {
         let mount: Option<Mount> = section!("mount", Mount, Mount::check);
         let wire = section!("wire", WireSettings, |wire: &WireSettings| WireConfig::new(*wire).map(|_| ()))
             .unwrap_or_default();
+        let normalized_cuts =
+            section!("normalized_cuts", NormalizedCutSettings, NormalizedCutSettings::check).unwrap_or_default();
         let chose_disparities = reader.section(&root, "matching").is_some_and(|section| section.has("disparities"));
         let mut config = Self {
             settings,
             disparities: chose_disparities.then_some(settings.matching.disparities),
             mount,
             wire,
+            normalized_cuts,
             rig: Rig::default(),
             file: None,
         };

@@ -21,6 +21,15 @@ fn disparities_follow_the_width_unless_chosen() {
 }
 
 #[test]
+fn normalized_cuts_have_a_section() {
+    let config = read("[normalized_cuts]\nmax_segments = 12\n").unwrap();
+    let expected = NormalizedCutSettings { max_segments: 12, ..NormalizedCutSettings::default() };
+    assert_eq!(config.normalized_cuts, expected);
+    let mistake = read("[normalized_cuts]\n\nmax_cut = 3.0\n").unwrap_err();
+    assert!(mistake.place.as_ref().is_some_and(|p| p.ends_with("line 3")), "{mistake}");
+}
+
+#[test]
 fn what_is_not_set_keeps_its_default() {
     let config = read("[surfaces]\nhorizontal_deg = 25.0\n[wire]\nnode = 3\n").unwrap();
     let settings = config.settings_for(512);
@@ -50,10 +59,15 @@ fn every_setting_is_documented_with_its_default() {
             "{name} is {value}, but docs/files.md says: {row}"
         );
     }
-    let rig = [("run", toml::to_string(&RunSettings::default())), ("bus", toml::to_string(&BusSettings::default()))];
-    for (section, text) in rig {
+    let others = [
+        ("run", toml::to_string(&RunSettings::default())),
+        ("bus", toml::to_string(&BusSettings::default())),
+        ("normalized_cuts", toml::to_string(&NormalizedCutSettings::default())),
+    ];
+    for (section, text) in others {
         for line in text.unwrap().lines() {
             let (name, value) = line.split_once(" = ").unwrap();
+            let value = value.trim_end_matches(".0");
             let name = format!("`{section}.{name}`");
             let row = documented.lines().find(|row| row.contains(&name));
             assert!(row.is_some_and(|row| row.contains(value)), "{name} is {value}, but docs/files.md says: {row:?}");

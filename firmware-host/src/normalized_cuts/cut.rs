@@ -28,7 +28,7 @@ struct Part {
 /// Two eigen-problems for each segment.
 pub(super) fn segments(graph: &Graph, settings: &NormalizedCutSettings) -> Vec<u16> {
     let whole = |nodes: Vec<usize>| {
-        let cut = best_of(&graph.part(&nodes), settings.min_pixels as usize).filter(|cut| cut.value < settings.max_cut);
+        let cut = best_of(&graph.part(&nodes), settings).filter(|cut| cut.value < settings.max_cut);
         Part { nodes, cut }
     };
     let mut parts = vec![whole((0..graph.len()).collect())];
@@ -52,15 +52,16 @@ pub(super) fn segments(graph: &Graph, settings: &NormalizedCutSettings) -> Vec<u
     numbers
 }
 
-/// The best cut along one of the two smallest eigenvectors, none of whose parts has fewer nodes than `least`.
+/// The best cut along one of the two smallest eigenvectors, none of whose parts has fewer nodes than a segment may have.
 ///
 /// The smallest is constant over each piece that hangs together (times the roots of the degrees), so it has a say only where
 /// the graph falls apart by itself.
-pub(super) fn best_of(graph: &Graph, least: usize) -> Option<Cut> {
-    if graph.len() < 2 * least.max(1) {
+pub(super) fn best_of(graph: &Graph, settings: &NormalizedCutSettings) -> Option<Cut> {
+    let least = settings.min_pixels.max(1) as usize;
+    if graph.len() < 2 * least {
         return None;
     }
-    let pairs = eigen::smallest(graph, 2);
+    let pairs = eigen::smallest(graph, 2, settings.tolerance);
     let cuts = pairs.iter().filter_map(|pair| along(graph, &pair.vector, least));
     cuts.min_by(|a, b| a.value.total_cmp(&b.value))
 }

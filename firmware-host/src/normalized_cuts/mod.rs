@@ -95,7 +95,7 @@ impl NormalizedCuts {
         let size = (self.pair.width as usize, self.pair.height as usize);
         assert_eq!((left.width(), left.height()), size, "the left picture has the size of the pair");
         assert_eq!((disparity.width(), disparity.height()), size, "the disparity picture has the size of the pair");
-        let shrunk = Shrunk::new(left, disparity, self.settings.width_px as usize);
+        let shrunk = Shrunk::new(left, disparity, self.settings.max_pixels as usize);
         let graph = Graph::of(&shrunk, &self.settings);
         let numbers = cut::segments(&graph, &self.settings);
         let mut segmentation = Segmentation::of(&shrunk, &numbers, disparity, self);

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NormalizedCutSettings {
-    /// The picture is shrunk by a whole number to at most this width, px: the time grows faster than the number of pixels.
-    pub width_px: u32,
+    /// The picture is shrunk by a whole number until it has at most this many pixels: the time grows faster than they do.
+    pub max_pixels: u32,
     /// Pixels of the shrunk picture up to this far apart have an affinity, px.
     pub radius_px: u32,
     /// Difference of grey values at which the affinity has fallen to 1/e.
@@ -24,6 +24,8 @@ pub struct NormalizedCutSettings {
     pub min_pixels: u32,
     /// Greatest number of segments.
     pub max_segments: u32,
+    /// Length of the rest at which an eigenvector counts as found. Only the order of its entries matters.
+    pub tolerance: f64,
 }
 
 impl NormalizedCutSettings {
@@ -33,21 +35,22 @@ impl NormalizedCutSettings {
     /// The first value that cannot be used, named `normalized_cuts.*`.
     pub fn check(&self) -> Result<(), ConfigError> {
         let check = |field, value: f64, low, high| ConfigError::check(field, value as f32, low, high);
-        check("normalized_cuts.width_px", f64::from(self.width_px), 16.0, 640.0)?;
+        check("normalized_cuts.max_pixels", f64::from(self.max_pixels), 64.0, 1.0e6)?;
         check("normalized_cuts.radius_px", f64::from(self.radius_px), 1.0, 16.0)?;
         check("normalized_cuts.grey_scale", self.grey_scale, 0.1, 1000.0)?;
         check("normalized_cuts.disparity_scale_px", self.disparity_scale_px, 0.01, 1000.0)?;
         check("normalized_cuts.place_scale_px", self.place_scale_px, 0.1, 1000.0)?;
         check("normalized_cuts.max_cut", self.max_cut, 0.0, 2.0)?;
         check("normalized_cuts.min_pixels", f64::from(self.min_pixels), 1.0, 1.0e5)?;
-        check("normalized_cuts.max_segments", f64::from(self.max_segments), 1.0, 1000.0)
+        check("normalized_cuts.max_segments", f64::from(self.max_segments), 1.0, 1000.0)?;
+        check("normalized_cuts.tolerance", self.tolerance, 1.0e-12, 1.0)
     }
 }
 
 impl Default for NormalizedCutSettings {
     fn default() -> Self {
         Self {
-            width_px: 160,
+            max_pixels: 12_500,
             radius_px: 5,
             grey_scale: 15.0,
             disparity_scale_px: 1.0,
@@ -55,6 +58,7 @@ impl Default for NormalizedCutSettings {
             max_cut: 0.06,
             min_pixels: 40,
             max_segments: 60,
+            tolerance: 1.0e-4,
         }
     }
 }

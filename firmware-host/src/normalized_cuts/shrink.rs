@@ -16,11 +16,13 @@ pub(super) struct Shrunk {
 }
 
 impl Shrunk {
-    /// Shrinks to at most `width_px`. Rows and columns that do not fill a pixel make a smaller one.
-    pub(super) fn new(left: &Picture<'_>, disparity: DisparityPicture<'_>, width_px: usize) -> Self {
+    /// Shrinks to at most `max_pixels`. Rows and columns that do not fill a pixel make a smaller one.
+    pub(super) fn new(left: &Picture<'_>, disparity: DisparityPicture<'_>, max_pixels: usize) -> Self {
         let (whole_width, whole_height) = (disparity.width(), disparity.height());
-        let factor = whole_width.div_ceil(width_px).max(1);
-        let (width, height) = (whole_width.div_ceil(factor), whole_height.div_ceil(factor));
+        let size = |factor: usize| (whole_width.div_ceil(factor), whole_height.div_ceil(factor));
+        let fits = |factor: &usize| size(*factor).0 * size(*factor).1 <= max_pixels;
+        let factor = (1..whole_width.max(2)).find(fits).unwrap_or(whole_width.max(1));
+        let (width, height) = size(factor);
         let mut shrunk = Self { width, height, factor, grey: Vec::new(), disparity_px: Vec::new() };
         let mut steps = Vec::with_capacity(factor * factor);
         for y in 0..height {

@@ -71,10 +71,10 @@ impl Stages {
 
         self.surfaces.run(cut, &self.depth, &cuts.rays);
         for (i, label) in result.labels.iter().enumerate() {
-            if let Some(place) = self.surfaces.place_at(i % width, i / width) {
-                if let Some(surface) = self.surfaces.table_mut().get_mut(place) {
-                    surface.class = result.segments[usize::from(*label)].surface.class;
-                }
+            if let Some(place) = self.surfaces.place_at(i % width, i / width)
+                && let Some(surface) = self.surfaces.table_mut().get_mut(place)
+            {
+                surface.class = result.segments[usize::from(*label)].surface.class;
             }
         }
         let ground = self.ground.run(&mut self.surfaces, &mut self.regions, cut, (&self.depth, &cuts.rays));
