@@ -6,6 +6,7 @@
 //!           replay       ├──> can_log    can.log
 //!           check        ├──> output     cells.csv, obstacles.csv, ground.csv
 //!           can decode   ├──> paint      disparity/, classes/, map/
+//!                        ├──> score      how good it is, where a recording brings the truth
 //!                        ├──> summary    summary.json
 //!                        └──> report     report.html
 //! ```
@@ -33,6 +34,7 @@ pub mod pipeline;
 pub mod record;
 pub mod report;
 pub mod scans;
+pub mod score;
 pub mod source;
 pub mod stopwatch;
 pub mod summary;

@@ -23,6 +23,7 @@ use crate::{
     output::{CellRow, OutputFolder, Tables},
     paint,
     report::{Report, ReportFrame},
+    score::{Scorer, Scores},
     source::{Input, Source},
     stopwatch::{FrameTimes, Stopwatch, milliseconds},
     view::FrameView,
@@ -53,6 +54,8 @@ pub struct Log {
     pub failures: Vec<FrameFailure>,
     /// What went on the bus.
     pub can: CanCounts,
+    /// What it is worth, where the recording brings the truth.
+    pub scores: Option<Scores>,
 }
 
 /// What is kept of each frame.
@@ -101,13 +104,14 @@ pub fn run<S: Source>(
     detector
         .configure(&job.settings, &input.calibration, &input.mount)
         .map_err(|error| Failure::config(error, job.config.file.as_deref()))?;
-    let mut pipeline = Pipeline::start(job, &detector, input.frames)?;
+    let mut pipeline = Pipeline::start(job, &detector, input)?;
     console.start_progress(input.frames, progress);
     let result = pipeline.play(input, &mut detector, console);
     console.end_progress();
     // Whatever happened, the bus is told that the node stops, and what was found so far is handed on.
-    let Pipeline { can, mut log, report, .. } = pipeline;
+    let Pipeline { can, mut log, report, scorer, .. } = pipeline;
     log.can = can.finish()?;
+    log.scores = scorer.and_then(|scorer| scorer.scores());
     result?;
     Ok((log, report))
 }
@@ -117,13 +121,14 @@ struct Pipeline<'a> {
     tables: Option<Tables>,
     can: CanLog,
     report: Report,
+    scorer: Option<Scorer>,
     log: Log,
     /// The left rectified picture, where pictures are wanted.
     left: Vec<u8>,
 }
 
 impl<'a> Pipeline<'a> {
-    fn start(job: &'a Job<'a>, detector: &ProgramDetector, frames: usize) -> Result<Self, Failure> {
+    fn start<S>(job: &'a Job<'a>, detector: &ProgramDetector, input: &Input<S>) -> Result<Self, Failure> {
         let config = WireConfig::new(job.wire).map_err(|e| Failure::config(e, job.config.file.as_deref()))?;
         let folder = job.folder;
         let wants = |output| job.write.contains(&output);
@@ -137,7 +142,8 @@ impl<'a> Pipeline<'a> {
             job,
             tables: if wants(Output::Cells) { Some(Tables::create(folder)?) } else { None },
             can: CanLog::create(wants(Output::Can).then_some(folder), config)?,
-            report: Report::new(wants(Output::Report), frames),
+            report: Report::new(wants(Output::Report), input.frames),
+            scorer: input.truth.clone().map(|truth| Scorer::new(truth, job.settings.map.geometry)),
             log: Log::default(),
             left: vec![0; width * height],
         })
@@ -155,6 +161,9 @@ impl<'a> Pipeline<'a> {
             for warning in input.source.take_warnings() {
                 console.warn(warning);
             }
+            for complaint in self.scorer.iter_mut().flat_map(Scorer::take_complaints) {
+                console.warn_of_kind("truth", complaint);
+            }
             match result {
                 Ok(None) => return Ok(()),
                 Ok(Some(Ok(health))) => say_health(console, self.log.frames.last(), health),
@@ -171,6 +180,9 @@ impl<'a> Pipeline<'a> {
         let (number, timestamp_ns) = upcoming.unzip();
         self.can.missing(timestamp_ns)?;
         self.report.skipped();
+        if let (Some(scorer), Some(number)) = (&mut self.scorer, number) {
+            scorer.missing(number);
+        }
         self.log.failures.push(FrameFailure { number, timestamp_ns, failure });
         Ok(())
     }
@@ -211,6 +223,9 @@ impl<'a> Pipeline<'a> {
             tables.frame(&view, &sent.cells)?;
         }
         self.pictures(&view)?;
+        if let Some(scorer) = &mut self.scorer {
+            scorer.frame(view.number, &sent.cells, view.disparity);
+        }
         let record = FrameRecord {
             number: view.number,
             timestamp_ns: view.timestamp_ns,

@@ -94,6 +94,7 @@ pub fn summary<S>(input: &Input<S>, job: &Job<'_>, log: &Log, warnings: &[Warnin
         "ground": ground(&log.frames),
         "health": {"levels": levels, "reasons": reasons},
         "can": log.can,
+        "score": log.scores,
         "warnings": warnings,
         "failures": failures,
         "settings": job.settings,
@@ -249,5 +250,25 @@ pub fn table(log: &Log) -> String {
         "CAN         {} frames: {} scans of at most {} frames, {} heartbeats",
         log.can.frames, log.can.scans, log.can.most_frames_per_scan, log.can.heartbeats
     ));
+    lines.extend(score_lines(log));
     lines.join("\n")
+}
+
+/// What the scores say, for the terminal.
+fn score_lines(log: &Log) -> Vec<String> {
+    let scores = log.scores.clone().unwrap_or_default();
+    let cells = scores.cells.map(|s| {
+        format!(
+            "truth       cells: F1 {:.3}, false alarms {:.4}, obstacles called free {:.4}, free cells found {:.3} ({} frames \
+             with lidar)",
+            s.f1, s.false_alarm, s.missed_free, s.free_found, s.frames
+        )
+    });
+    let disparity = scores.disparity.map(|s| {
+        format!(
+            "truth       disparity: density {:.3}, off by more than 3 px {:.4}, by more than 1 px {:.4}",
+            s.density, s.bad3, s.bad1
+        )
+    });
+    cells.into_iter().chain(disparity).collect()
 }

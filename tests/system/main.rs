@@ -10,6 +10,7 @@ mod ground;
 mod health;
 mod joining;
 mod rover;
+mod scoring;
 mod slope;
 
 use std::path::Path;
