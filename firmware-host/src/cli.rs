@@ -4,6 +4,8 @@ use std::{num::ParseIntError, ops::Range, path::PathBuf, str::FromStr};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::compare::Method;
+
 /// Stereo obstacle detection: pictures from two cameras in, obstacle cells on a CAN bus out.
 #[derive(Debug, Parser)]
 #[command(version, about, long_about = None, after_long_help = AFTER_HELP, after_help = "With no command, `fencepost demo` runs. `fencepost --help` shows examples.")]
@@ -30,6 +32,9 @@ Examples:
       report.html
   fencepost replay garden --out out --frames 100..200 --write cells,can
       Only frames 100 to 199, only the tables and the CAN log
+  fencepost compare ~/recordings/garden --out out/compare
+      Every detector on the same pairs, side by side; scores where there is
+      truth
   fencepost cameras
       The cameras that are plugged in, and the lines of a rig's file for them
   fencepost record --config rig.toml --out ~/recordings/yard --seconds 60
@@ -58,6 +63,8 @@ pub enum Command {
     Demo(DemoArgs),
     /// Detect obstacles in a recording.
     Replay(ReplayArgs),
+    /// Run detectors over a recording side by side: pictures, scores, times and memory in one report.
+    Compare(CompareArgs),
     /// Run a rig: from its cameras to the CAN bus, until SIGTERM or SIGINT.
     Run(RunArgs),
     /// Say what a recording, a calibration or a configuration holds, and what the detector can see with it.
@@ -112,6 +119,28 @@ pub struct ReplayArgs {
     #[arg(long, value_name = "A..B", default_value = "..")]
     pub frames: FrameRange,
     /// Settings of the detector and of the bus.
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Folder of the recording.
+    pub recording: PathBuf,
+    /// The detectors, separated by commas; all of them if left out.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', default_values_t = Method::ALL)]
+    pub detectors: Vec<Method>,
+    /// Folder to write to; made if it is not there. Files of an earlier run are replaced.
+    #[arg(long, value_name = "DIR", default_value = "out/compare")]
+    pub out: PathBuf,
+    /// Only these frames: `A..B` without B, `A..` to the end, or one number.
+    #[arg(long, value_name = "A..B", default_value = "..")]
+    pub frames: FrameRange,
+    /// Most frames whose pictures are in the report, spread over the recording.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u16).range(0..=100))]
+    pub show: u16,
+    /// Settings of the detectors.
     #[command(flatten)]
     pub detector: DetectorArgs,
 }

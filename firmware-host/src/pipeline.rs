@@ -9,6 +9,7 @@ use fencepost_core::{
     picture::Picture,
     rectify::Side,
     settings::Settings,
+    surfaces::Surface,
     wire::{WireConfig, WireSettings},
 };
 use fencepost_hal::camera::StereoPair;
@@ -22,8 +23,9 @@ use crate::{
     error::Failure,
     output::{CellRow, OutputFolder, Tables},
     paint,
-    report::{Report, ReportFrame},
-    score::{Scorer, Scores},
+    reference::Reference,
+    report::{Painter, Shown},
+    score::{CellCounts, Scorer, Scores},
     source::{Input, Source},
     stopwatch::{FrameTimes, Stopwatch, milliseconds},
     view::FrameView,
@@ -37,8 +39,12 @@ pub struct Job<'a> {
     pub folder: &'a OutputFolder,
     /// What to write.
     pub write: &'a [Output],
+    /// Most frames that are painted for a report.
+    pub show: usize,
     /// Settings of the detector.
     pub settings: Settings,
+    /// A detector outside the core that has the last word.
+    pub reference: Option<&'a dyn Reference>,
     /// Settings of the bus.
     pub wire: WireSettings,
     /// The configuration file, for errors.
@@ -56,6 +62,8 @@ pub struct Log {
     pub can: CanCounts,
     /// What it is worth, where the recording brings the truth.
     pub scores: Option<Scores>,
+    /// Most memory that a detector outside the core held, bytes.
+    pub reference_memory_bytes: usize,
 }
 
 /// What is kept of each frame.
@@ -77,6 +85,8 @@ pub struct FrameRecord {
     pub obstacles: usize,
     /// Distance from the vehicle's origin to the centre of the nearest obstacle cell, metres.
     pub nearest_m: Option<f32>,
+    /// What the cells are worth, where there is truth of them.
+    pub cell_counts: Option<CellCounts>,
 }
 
 /// A frame that could not be used.
@@ -94,41 +104,42 @@ pub struct FrameFailure {
 ///
 /// # Errors
 /// When the calibration, the mount or the settings cannot be used, or the output cannot be written.
-pub fn run<S: Source>(
+pub fn run<S: Source, P: Painter>(
     input: &mut Input<S>,
     job: &Job<'_>,
+    painter: P,
     console: &mut Console,
     progress: &'static str,
-) -> Result<(Log, Report), Failure> {
+) -> Result<(Log, Shown<P>), Failure> {
     let mut detector = detector::lock();
     detector
         .configure(&job.settings, &input.calibration, &input.mount)
         .map_err(|error| Failure::config(error, job.config.file.as_deref()))?;
-    let mut pipeline = Pipeline::start(job, &detector, input)?;
+    let mut pipeline = Pipeline::start(job, painter, &detector, input)?;
     console.start_progress(input.frames, progress);
     let result = pipeline.play(input, &mut detector, console);
     console.end_progress();
     // Whatever happened, the bus is told that the node stops, and what was found so far is handed on.
-    let Pipeline { can, mut log, report, scorer, .. } = pipeline;
+    let Pipeline { can, mut log, shown, scorer, .. } = pipeline;
     log.can = can.finish()?;
     log.scores = scorer.and_then(|scorer| scorer.scores());
     result?;
-    Ok((log, report))
+    Ok((log, shown))
 }
 
-struct Pipeline<'a> {
+struct Pipeline<'a, P: Painter> {
     job: &'a Job<'a>,
     tables: Option<Tables>,
     can: CanLog,
-    report: Report,
+    shown: Shown<P>,
     scorer: Option<Scorer>,
     log: Log,
     /// The left rectified picture, where pictures are wanted.
     left: Vec<u8>,
 }
 
-impl<'a> Pipeline<'a> {
-    fn start<S>(job: &'a Job<'a>, detector: &ProgramDetector, input: &Input<S>) -> Result<Self, Failure> {
+impl<'a, P: Painter> Pipeline<'a, P> {
+    fn start<S>(job: &'a Job<'a>, painter: P, detector: &ProgramDetector, input: &Input<S>) -> Result<Self, Failure> {
         let config = WireConfig::new(job.wire).map_err(|e| Failure::config(e, job.config.file.as_deref()))?;
         let folder = job.folder;
         let wants = |output| job.write.contains(&output);
@@ -142,7 +153,7 @@ impl<'a> Pipeline<'a> {
             job,
             tables: if wants(Output::Cells) { Some(Tables::create(folder)?) } else { None },
             can: CanLog::create(wants(Output::Can).then_some(folder), config)?,
-            report: Report::new(wants(Output::Report), input.frames),
+            shown: Shown::new(painter, job.show, input.frames),
             scorer: input.truth.clone().map(|truth| Scorer::new(truth, job.settings.map.geometry)),
             log: Log::default(),
             left: vec![0; width * height],
@@ -175,11 +186,16 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    fn missing(&mut self, upcoming: Option<(u32, u64)>, failure: Failure, console: &Console) -> Result<(), Failure> {
-        console.error(&failure);
+    fn missing(
+        &mut self,
+        upcoming: Option<(u32, u64)>,
+        failure: Failure,
+        console: &mut Console,
+    ) -> Result<(), Failure> {
+        console.error_once(&failure);
         let (number, timestamp_ns) = upcoming.unzip();
         self.can.missing(timestamp_ns)?;
-        self.report.skipped();
+        self.shown.skipped();
         if let (Some(scorer), Some(number)) = (&mut self.scorer, number) {
             scorer.missing(number);
         }
@@ -215,6 +231,22 @@ impl<'a> Pipeline<'a> {
             vehicle,
             surface_at: &surface_at,
         };
+        let start = Instant::now();
+        let seen = self.job.reference.map(|reference| reference.look(&view)).transpose().map_err(FrameError::Frame)?;
+        let own = seen.as_ref().map(|seen| seen.over(detection));
+        let detection = own.as_deref().unwrap_or(detection);
+        let (width, _) = view.size();
+        let class_at = |x: usize, y: usize| {
+            let class = seen.as_ref()?.class_at(x, y, width)?;
+            Some(Surface { class, ..Surface::default() })
+        };
+        if let Some(seen) = &seen {
+            times.reference_ms = milliseconds(start.elapsed());
+            times.total_ms += times.reference_ms;
+            self.log.reference_memory_bytes = self.log.reference_memory_bytes.max(seen.memory_bytes);
+            view.detection = detection;
+            view.surface_at = &class_at;
+        }
         let sent = self.can.scan(&view)?;
         view.health = self.can.health();
         times.wire_ms = milliseconds(sent.encoding);
@@ -223,9 +255,8 @@ impl<'a> Pipeline<'a> {
             tables.frame(&view, &sent.cells)?;
         }
         self.pictures(&view)?;
-        if let Some(scorer) = &mut self.scorer {
-            scorer.frame(view.number, &sent.cells, view.disparity);
-        }
+        let score = |scorer: &mut Scorer| scorer.frame(view.number, &sent.cells, view.disparity);
+        let cell_counts = self.scorer.as_mut().and_then(score);
         let record = FrameRecord {
             number: view.number,
             timestamp_ns: view.timestamp_ns,
@@ -235,9 +266,10 @@ impl<'a> Pipeline<'a> {
             statistics: detection.statistics,
             obstacles: detection.obstacles.len(),
             nearest_m: nearest_cell_m(&sent.cells, &detection.map.geometry),
+            cell_counts,
         };
         self.log.frames.push(record);
-        self.report.frame(|| ReportFrame::paint(&view, &self.job.settings));
+        self.shown.frame(&view, &self.job.settings);
         Ok(view.health)
     }
 
@@ -246,7 +278,7 @@ impl<'a> Pipeline<'a> {
     }
 
     fn needs_left(&self) -> bool {
-        self.wants(Output::Classes) || self.report.wants_frame()
+        self.wants(Output::Classes) || self.shown.wants_frame() || self.job.reference.is_some()
     }
 
     /// The pictures of a frame; made after its times were taken.

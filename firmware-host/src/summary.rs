@@ -13,6 +13,8 @@ use serde_json::{Value, json};
 
 use crate::{
     console::WarningCount,
+    error::Failure,
+    output::OutputFolder,
     pipeline::{FrameRecord, Job, Log},
     source::Input,
     stopwatch::TimeSummary,
@@ -40,6 +42,13 @@ pub fn stage_times(frames: &[FrameRecord]) -> Vec<StageTimes> {
         times: TimeSummary::of(frames.iter().map(|frame| frame.times.stages_ms[stage as usize])),
     };
     let mut stages: Vec<_> = Stage::ALL.into_iter().map(stage).collect();
+    if frames.iter().any(|frame| frame.times.reference_ms > 0.0) {
+        stages.push(StageTimes {
+            name: "reference",
+            words: "looks at the frame outside the core",
+            times: TimeSummary::of(frames.iter().map(|frame| frame.times.reference_ms)),
+        });
+    }
     stages.push(StageTimes {
         name: "wire",
         words: "packs the scan into CAN frames",
@@ -102,6 +111,17 @@ pub fn summary<S>(input: &Input<S>, job: &Job<'_>, log: &Log, warnings: &[Warnin
         "mount": input.mount,
         "calibration": calibration(&input.calibration),
     })
+}
+
+/// Writes a summary to a folder.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write(folder: &OutputFolder, name: &str, summary: &Value) -> Result<(), Failure> {
+    let mut text = serde_json::to_string_pretty(summary)
+        .map_err(|error| Failure::work(format!("the summary cannot be made: {error}")).at(name))?;
+    text.push('\n');
+    folder.write(name, text.as_bytes())
 }
 
 /// Time from the first to the last frame, seconds.

@@ -133,7 +133,7 @@ fn made_up_cells() {
         let (mut random, mut counts, mut table) = (Random(seed), CellCounts::default(), Vec::new());
         for frame in recording.frames.iter().map(|frame| frame.number) {
             let rows = made_up_rows(&truth, frame, size_mm, &mut random);
-            counts.frame(&truth.cells_of(frame, size_mm).unwrap().unwrap(), &Said::of(&rows));
+            counts += CellCounts::of_frame(&truth.cells_of(frame, size_mm).unwrap().unwrap(), &Said::of(&rows));
             table.extend(rows.into_iter().map(|row| (frame, row)));
         }
         let ours = serde_json::to_value(counts.score().unwrap()).unwrap();

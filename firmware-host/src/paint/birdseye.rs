@@ -8,6 +8,7 @@ use embedded_graphics::{
     text::{Alignment, Baseline, Text, TextStyle, TextStyleBuilder},
 };
 use fencepost_core::map::{CellState, MapGeometry, UnknownReason};
+use fencepost_hal::scene::TruthCell;
 
 use super::{Canvas, colours::Colour};
 use crate::{view::FrameView, words};
@@ -31,8 +32,46 @@ const BOTTOM_PX: i32 = 76;
 /// Metres from one line of the grid to the next.
 const GRID_M: i32 = 5;
 
+/// What the signs of a map are called: colour, whether it is hatched, words.
+type Legend<'a> = &'a [(Colour, bool, &'a str)];
+
+const LEGEND: Legend<'static> = &[
+    (OBSTACLE, false, "obstacle"),
+    (FREE, false, "free"),
+    (UNKNOWN, true, "not known"),
+    (UNKNOWN, false, "out of view"),
+];
+const TRUE_LEGEND: Legend<'static> =
+    &[(OBSTACLE, false, "obstacle"), (FREE, false, "free"), (UNKNOWN, false, "not judged")];
+
 /// Paints the map of a frame.
 pub fn birdseye(view: &FrameView<'_>) -> Canvas {
+    let reasons = words::reason_names(view.health, ", ");
+    let level = words::level_name(view.health.level);
+    let title = match reasons.is_empty() {
+        true => format!("frame {}   health {level}", view.number),
+        false => format!("frame {}   health {level}: {reasons}", view.number),
+    };
+    paint(view, &title, LEGEND)
+}
+
+/// Paints what is really in the cells of a frame, in the same manner. `truth(i, j)` is told of cell `(i, j)`.
+pub fn true_map(view: &FrameView<'_>, truth: impl Fn(i16, i16) -> TruthCell) -> Canvas {
+    let mut detection = Box::new(view.detection.clone());
+    detection.obstacles.clear();
+    let geometry = detection.map.geometry;
+    for (index, cell) in detection.map.cells.iter_mut().enumerate() {
+        let (i, j) = geometry.cell_at(index);
+        cell.state = match truth(i, j) {
+            TruthCell::Obstacle => CellState::Obstacle,
+            TruthCell::Free => CellState::Free,
+            TruthCell::NotJudged => CellState::Unknown(UnknownReason::OutsideView),
+        };
+    }
+    paint(&FrameView { detection: &detection, ..*view }, &format!("frame {}   truth", view.number), TRUE_LEGEND)
+}
+
+fn paint(view: &FrameView<'_>, title: &str, legend: Legend<'_>) -> Canvas {
     let scale = Scale::new(view.detection.map.geometry);
     let (width, height) = scale.canvas_px();
     let mut canvas = Canvas::new(width, height, PAPER);
@@ -41,7 +80,7 @@ pub fn birdseye(view: &FrameView<'_>) -> Canvas {
     paint_field_of_view(&mut canvas, &scale, view);
     paint_obstacles(&mut canvas, &scale, view);
     paint_robot(&mut canvas, &scale);
-    paint_words(&mut canvas, &scale, view);
+    paint_words(&mut canvas, &scale, title, legend);
     canvas
 }
 
@@ -197,19 +236,12 @@ fn paint_robot(canvas: &mut Canvas, scale: &Scale) {
     draw(&robot.into_styled(PrimitiveStyle::with_fill(rgb(INK))), canvas);
 }
 
-fn paint_words(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
+fn paint_words(canvas: &mut Canvas, scale: &Scale, title: &str, legend: Legend<'_>) {
     let plain = MonoTextStyle::new(&FONT_8X13, rgb(INK));
     let bold = MonoTextStyle::new(&FONT_8X13_BOLD, rgb(INK));
     let left_top = text_style(Alignment::Left, Baseline::Top);
     let (width, height) = scale.map_px();
 
-    let health = view.health;
-    let reasons = words::reason_names(health, ", ");
-    let level = words::level_name(health.level);
-    let title = match reasons.is_empty() {
-        true => format!("frame {}   health {level}", view.number),
-        false => format!("frame {}   health {level}: {reasons}", view.number),
-    };
     let room = (canvas.width() as i32 - 16) / 8;
     let title: String = title.chars().take(room.max(0) as usize).collect();
     draw(&Text::with_text_style(&title, Point::new(8, 10), bold, left_top), canvas);
@@ -218,18 +250,13 @@ fn paint_words(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
     let axis = "y, metres to the left";
     draw(&Text::with_text_style(axis, Point::new(LEFT_PX + width / 2, TOP_PX + height + 24), plain, middle), canvas);
     draw_upward(canvas, "x, metres ahead", Point::new(6, TOP_PX + height / 2));
-    paint_legend(canvas, TOP_PX + height + 50);
+    paint_legend(canvas, TOP_PX + height + 50, legend);
 }
 
-fn paint_legend(canvas: &mut Canvas, y: i32) {
+fn paint_legend(canvas: &mut Canvas, y: i32, legend: Legend<'_>) {
     let plain = MonoTextStyle::new(&FONT_8X13, rgb(INK));
     let mut x = 12;
-    for (colour, hatched, word) in [
-        (OBSTACLE, false, "obstacle"),
-        (FREE, false, "free"),
-        (UNKNOWN, true, "not known"),
-        (UNKNOWN, false, "out of view"),
-    ] {
+    for &(colour, hatched, word) in legend {
         for dy in 0..13 {
             for dx in 0..13 {
                 let edge = dx == 0 || dy == 0 || dx == 12 || dy == 12;
@@ -302,6 +329,21 @@ mod tests {
                 assert_ne!(colour, DOT, "cell ({i}, {j})");
             }
         }
+    }
+
+    #[test]
+    fn the_truth_is_painted_in_place_of_what_was_found() {
+        let made_up = MadeUp::new();
+        let truth = |i: i16, j: i16| if (i, j) == (20, 3) { TruthCell::Obstacle } else { TruthCell::Free };
+        let canvas = made_up.view(|view| true_map(view, truth));
+        let scale = Scale::new(made_up.detection.map.geometry);
+        let dot_at = |i: i16, j: i16| {
+            let (x_m, y_m) = made_up.detection.map.geometry.centre_m(i, j);
+            let at = scale.point(x_m, y_m);
+            canvas.get(at.x as usize, at.y as usize) == DOT
+        };
+        assert!(dot_at(20, 3), "the obstacle of the truth");
+        assert!(!dot_at(9, 1), "what the detector found");
     }
 
     #[test]

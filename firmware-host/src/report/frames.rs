@@ -1,9 +1,9 @@
 //! The figures of one frame.
 
-use base64::{Engine, prelude::BASE64_STANDARD};
 use fencepost_core::{disparity::Reason, geometry::RectifiedPair, obstacles::Obstacle, settings::Settings};
 use serde::Serialize;
 
+use super::{Embedded, Painter};
 use crate::{
     paint::{self, Canvas, Figures, birdseye, reason_colour, value_colour},
     view::FrameView,
@@ -36,9 +36,8 @@ struct Figure {
     letter: &'static str,
     title: &'static str,
     caption: &'static str,
-    width: usize,
-    height: usize,
-    uri: String,
+    #[serde(flatten)]
+    picture: Embedded,
 }
 
 /// A mark on the scale of the disparity picture.
@@ -65,6 +64,18 @@ struct ObstacleRow {
     height: String,
     length: String,
     pixels: u32,
+}
+
+/// Paints the figures of a frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FramePainter;
+
+impl Painter for FramePainter {
+    type Painted = ReportFrame;
+
+    fn paint(&self, view: &FrameView<'_>, settings: &Settings) -> ReportFrame {
+        ReportFrame::paint(view, settings)
+    }
 }
 
 impl ReportFrame {
@@ -156,16 +167,7 @@ fn camera_figures(figures: &Figures<'_>) -> Vec<Figure> {
 }
 
 fn figure(letter: &'static str, title: &'static str, caption: &'static str, canvas: &Canvas) -> Figure {
-    let thinned = canvas.thinned(canvas.width().div_ceil(WIDEST));
-    let png = thinned.small_png();
-    Figure {
-        letter,
-        title,
-        caption,
-        width: thinned.width(),
-        height: thinned.height(),
-        uri: format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png)),
-    }
+    Figure { letter, title, caption, picture: Embedded::new(canvas, WIDEST) }
 }
 
 /// The disparities between which 98 of 100 pixels lie: the whole range searched would leave most pictures dark.

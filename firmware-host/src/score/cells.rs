@@ -1,6 +1,6 @@
 //! Cells that were reported, against those that are really there. One cell of slack in every direction.
 
-use std::collections::HashSet;
+use std::{collections::HashSet, ops::AddAssign};
 
 use fencepost_core::map::CellState;
 use serde::Serialize;
@@ -34,6 +34,21 @@ pub struct CellCounts {
     free_found: u64,
     clear: u64,
     clear_called_obstacle: u64,
+}
+
+impl AddAssign for CellCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.frames += other.frames;
+        self.obstacles += other.obstacles;
+        self.obstacles_found += other.obstacles_found;
+        self.obstacles_called_free += other.obstacles_called_free;
+        self.reported += other.reported;
+        self.reported_true += other.reported_true;
+        self.free += other.free;
+        self.free_found += other.free_found;
+        self.clear += other.clear;
+        self.clear_called_obstacle += other.clear_called_obstacle;
+    }
 }
 
 /// What the cells are worth. The names are those of the field's scripts.
@@ -76,11 +91,11 @@ impl Said {
 }
 
 impl CellCounts {
-    /// Counts a frame.
+    /// The counts of one frame.
     ///
     /// # Bound
     /// Nine looks at the other side for each cell.
-    pub fn frame(&mut self, truth: &TrueCells, said: &Said) {
+    pub fn of_frame(truth: &TrueCells, said: &Said) -> Self {
         let cell_m = cell_size_m(truth.cell_size_mm);
         let count = |cells: &HashSet<CellIndex>, is: &dyn Fn(CellIndex) -> bool| {
             cells.iter().filter(|cell| is(**cell)).count() as u64
@@ -88,16 +103,18 @@ impl CellCounts {
         let said_near = |cell| near(&said.obstacles, cell);
         let truth_near = |cell| near(&truth.obstacles, cell);
         let is_counted = |cell| is_judged(cell, cell_m) && (truth_near(cell) || near(&truth.free, cell));
-        self.frames += 1;
-        self.obstacles += truth.obstacles.len() as u64;
-        self.obstacles_found += count(&truth.obstacles, &said_near);
-        self.obstacles_called_free += count(&truth.obstacles, &|c| said.free.contains(&c) && !said_near(c));
-        self.reported += count(&said.obstacles, &is_counted);
-        self.reported_true += count(&said.obstacles, &|c| is_counted(c) && truth_near(c));
-        self.free += truth.free.len() as u64;
-        self.free_found += count(&truth.free, &|c| said.free.contains(&c));
-        self.clear += count(&truth.free, &|c| !truth_near(c));
-        self.clear_called_obstacle += count(&truth.free, &|c| !truth_near(c) && said.obstacles.contains(&c));
+        Self {
+            frames: 1,
+            obstacles: truth.obstacles.len() as u64,
+            obstacles_found: count(&truth.obstacles, &said_near),
+            obstacles_called_free: count(&truth.obstacles, &|c| said.free.contains(&c) && !said_near(c)),
+            reported: count(&said.obstacles, &is_counted),
+            reported_true: count(&said.obstacles, &|c| is_counted(c) && truth_near(c)),
+            free: truth.free.len() as u64,
+            free_found: count(&truth.free, &|c| said.free.contains(&c)),
+            clear: count(&truth.free, &|c| !truth_near(c)),
+            clear_called_obstacle: count(&truth.free, &|c| !truth_near(c) && said.obstacles.contains(&c)),
+        }
     }
 
     /// The figures; `None` without a frame.
@@ -130,9 +147,7 @@ mod tests {
         let set = |cells: &[CellIndex]| cells.iter().copied().collect::<HashSet<_>>();
         let truth = TrueCells { obstacles: set(truth[0]), free: set(truth[1]), cell_size_mm: 500 };
         let said = Said { obstacles: set(said[0]), free: set(said[1]) };
-        let mut counts = CellCounts::default();
-        counts.frame(&truth, &said);
-        counts.score().unwrap()
+        CellCounts::of_frame(&truth, &said).score().unwrap()
     }
 
     #[test]
@@ -169,6 +184,17 @@ mod tests {
         let edge = [&[(8, 0), (39, 19)][..], &[]];
         assert_eq!(score(edge, [&[(7, 0), (40, 19), (39, 20)], &[]]).precision, 0.0, "of cells judged there is none");
         assert_eq!(score(edge, [&[(7, 0), (40, 19), (39, 20)], &[]]).recall, 1.0, "but they are near");
+    }
+
+    #[test]
+    fn frames_add_up() {
+        let set = |cells: &[CellIndex]| cells.iter().copied().collect::<HashSet<_>>();
+        let truth = TrueCells { obstacles: set(&[(20, 0), (30, 0)]), free: set(&[(10, 0)]), cell_size_mm: 500 };
+        let found = Said { obstacles: set(&[(20, 0)]), free: set(&[(10, 0)]) };
+        let mut counts = CellCounts::of_frame(&truth, &found);
+        counts += CellCounts::of_frame(&truth, &Said::default());
+        let score = counts.score().unwrap();
+        assert_eq!((score.frames, score.recall, score.free_found, score.precision), (2, 0.25, 0.5, 1.0));
     }
 
     #[test]

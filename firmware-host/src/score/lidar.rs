@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use fencepost_hal::calibration::LidarCalibration;
+use fencepost_hal::{calibration::LidarCalibration, scene::TruthCell};
 use nalgebra::Vector3;
 
 use super::{
@@ -39,6 +39,17 @@ pub struct TrueCells {
     pub free: HashSet<CellIndex>,
     /// Edge of a cell, millimetres.
     pub cell_size_mm: u16,
+}
+
+impl TrueCells {
+    /// What is in a cell.
+    pub fn get(&self, cell: CellIndex) -> TruthCell {
+        match (self.obstacles.contains(&cell), self.free.contains(&cell)) {
+            (true, _) => TruthCell::Obstacle,
+            (false, true) => TruthCell::Free,
+            (false, false) => TruthCell::NotJudged,
+        }
+    }
 }
 
 /// Sorts the points of a sweep, in the lidar's frame, into cells. Only points count that both cameras see; `size` is that of the left

@@ -13,12 +13,14 @@
 mod cells;
 mod disparity;
 mod draws;
+mod figures;
 mod lidar;
 mod road;
 mod truth;
 
 pub use cells::{CellCounts, CellScore, Said};
 pub use disparity::{DisparityCounts, DisparityScore};
+pub use figures::{CELL_FIGURES, DISPARITY_FIGURES, Figure};
 pub use lidar::{TrueCells, true_cells};
 pub use road::NoRoad;
 pub use truth::RecordedTruth;
@@ -55,13 +57,12 @@ pub struct Scorer {
 impl Scorer {
     /// For a run whose map has this `geometry`.
     pub fn new(truth: Arc<RecordedTruth>, geometry: MapGeometry) -> Self {
-        let (cells, disparity) = Default::default();
+        let (cells, disparity) = (CellCounts::default(), DisparityCounts::default());
         Self { truth, geometry, cells, disparity, complaints: Vec::new() }
     }
 
-    /// Takes what was found in a frame: the cells that go on the bus, and the disparity.
-    pub fn frame(&mut self, number: u32, rows: &[CellRow], disparity: DisparityPicture<'_>) {
-        self.take_cells(number, &Said::of(rows));
+    /// Takes what was found in a frame: the cells that go on the bus, and the disparity. Returns the counts of its cells.
+    pub fn frame(&mut self, number: u32, rows: &[CellRow], disparity: DisparityPicture<'_>) -> Option<CellCounts> {
         match self.truth.disparity_of(number) {
             Ok(Some(truth)) => {
                 let found = paint::disparity16(disparity);
@@ -73,6 +74,7 @@ impl Scorer {
             Ok(None) => {}
             Err(complaint) => self.complaints.push(complaint),
         }
+        self.take_cells(number, &Said::of(rows))
     }
 
     /// A frame that could not be used: nothing was said of its cells.
@@ -80,11 +82,17 @@ impl Scorer {
         self.take_cells(number, &Said::default());
     }
 
-    fn take_cells(&mut self, number: u32, said: &Said) {
+    fn take_cells(&mut self, number: u32, said: &Said) -> Option<CellCounts> {
         match self.truth.cells_of(number, self.geometry.cell_size_mm) {
-            Ok(Some(truth)) => self.cells.frame(&truth, said),
-            Ok(None) => {}
-            Err(complaint) => self.complaints.push(complaint),
+            Ok(truth) => {
+                let counts = CellCounts::of_frame(truth?.as_ref(), said);
+                self.cells += counts;
+                Some(counts)
+            }
+            Err(complaint) => {
+                self.complaints.push(complaint);
+                None
+            }
         }
     }
 
