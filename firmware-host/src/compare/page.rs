@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-use super::{Outcome, SidePictures};
+use super::{Outcome, SidePictures, pictures::mistake_colour};
 use crate::{
     console::WarningCount,
     error::Failure,
     paint,
     report::{self, Embedded},
-    score::{CELL_FIGURES, DISPARITY_FIGURES, Figure},
+    score::{CELL_FIGURES, DISPARITY_FIGURES, Figure, Mistake},
     source::Input,
     summary::{self, StageTimes},
     words,
@@ -32,6 +32,14 @@ struct Page<'a> {
     health: Vec<HealthRow>,
     ground_colour: String,
     obstacle_colour: String,
+    mistakes: Vec<MistakeKey>,
+}
+
+/// What the frame around a cell means.
+#[derive(Serialize)]
+struct MistakeKey {
+    words: &'static str,
+    colour: String,
 }
 
 #[derive(Serialize)]
@@ -130,8 +138,21 @@ pub fn page<S>(input: &Input<S>, outcomes: &[Outcome], warnings: &[WarningCount]
             health: outcomes.iter().map(health).collect(),
             ground_colour: paint::hex(paint::GROUND),
             obstacle_colour: paint::hex(paint::OBSTACLE),
+            mistakes: mistake_keys(outcomes),
         },
     )
+}
+
+/// Only where there is truth of the cells.
+fn mistake_keys(outcomes: &[Outcome]) -> Vec<MistakeKey> {
+    let key = |(mistake, words)| MistakeKey { words, colour: paint::hex(mistake_colour(mistake)) };
+    let keys = [
+        (Mistake::Missed, "an obstacle that is not reported"),
+        (Mistake::CalledFree, "one that is called free"),
+        (Mistake::NotThere, "a reported one that is not there"),
+    ];
+    let has_truth = outcomes.iter().flat_map(|outcome| &outcome.pictures).any(|pictures| pictures.truth.is_some());
+    keys.map(key).into_iter().filter(|_| has_truth).collect()
 }
 
 fn detectors(outcomes: &[Outcome]) -> Vec<Detector> {

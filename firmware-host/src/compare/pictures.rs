@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use fencepost_core::settings::Settings;
+use fencepost_core::{map::Cell, settings::Settings};
 use serde::Serialize;
 
 use crate::{
+    output::CellRow,
     paint::{self, Figures},
     report::{Embedded, Painter},
-    score::RecordedTruth,
+    score::{Mistake, RecordedTruth, Said, TrueCells, mistakes},
     view::FrameView,
 };
 
@@ -45,15 +46,37 @@ impl Painter for SidePainter {
         let cell_size_mm = view.detection.map.geometry.cell_size_mm;
         // What is wrong with the truth was said when the frame was scored.
         let truth = self.truth.as_ref().and_then(|truth| truth.cells_of(view.number, cell_size_mm).ok().flatten());
-        let true_map =
-            |cells: Arc<crate::score::TrueCells>| paint::true_map(view, |i, j| cells.get((i32::from(i), i32::from(j))));
+        let true_map = |cells: Arc<TrueCells>| paint::true_map(view, |i, j| cells.get((i32::from(i), i32::from(j))));
         let embedded = |canvas| Embedded::new(&canvas, WIDEST);
+        let mut map = paint::birdseye(view);
+        if let Some(truth) = &truth {
+            let wrong = mistakes(truth, &said(view));
+            let marked = wrong.into_iter().filter_map(|((i, j), mistake)| {
+                Some(((i16::try_from(i).ok()?, i16::try_from(j).ok()?), mistake_colour(mistake)))
+            });
+            paint::mark_cells(&mut map, view.detection.map.geometry, marked);
+        }
         SidePictures {
             number: view.number,
             classes: embedded(figures.classes()),
-            map: embedded(paint::birdseye(view)),
+            map: embedded(map),
             left: embedded(figures.left()),
             truth: truth.map(true_map).map(embedded),
         }
     }
+}
+
+/// Colour of the frame around a cell that is wrong.
+pub(super) const fn mistake_colour(mistake: Mistake) -> [u8; 3] {
+    match mistake {
+        Mistake::Missed => paint::MISSED,
+        Mistake::CalledFree => paint::CALLED_FREE,
+        Mistake::NotThere => paint::NOT_THERE,
+    }
+}
+
+fn said(view: &FrameView<'_>) -> Said {
+    let map = &view.detection.map;
+    let row = |(index, content): (usize, &Cell)| CellRow { cell: map.geometry.cell_at(index), content: *content };
+    Said::of(&map.cells.iter().enumerate().map(row).collect::<Vec<_>>())
 }

@@ -71,6 +71,17 @@ pub fn true_map(view: &FrameView<'_>, truth: impl Fn(i16, i16) -> TruthCell) -> 
     paint(&FrameView { detection: &detection, ..*view }, &format!("frame {}   truth", view.number), TRUE_LEGEND)
 }
 
+/// Marks cells of a map that [`birdseye`] painted with a frame of a colour.
+pub fn mark_cells(canvas: &mut Canvas, geometry: MapGeometry, cells: impl IntoIterator<Item = ((i16, i16), Colour)>) {
+    let scale = Scale::new(geometry);
+    for ((i, j), colour) in cells {
+        let Some(index) = geometry.index(i, j) else { continue };
+        let size = Size::new(scale.px_per_cell.unsigned_abs() + 1, scale.px_per_cell.unsigned_abs() + 1);
+        let style = PrimitiveStyle::with_stroke(rgb(colour), if scale.px_per_cell >= 8 { 2 } else { 1 });
+        draw(&Rectangle::new(scale.cell(index), size).into_styled(style), canvas);
+    }
+}
+
 fn paint(view: &FrameView<'_>, title: &str, legend: Legend<'_>) -> Canvas {
     let scale = Scale::new(view.detection.map.geometry);
     let (width, height) = scale.canvas_px();

@@ -96,13 +96,12 @@ impl CellCounts {
     /// # Bound
     /// Nine looks at the other side for each cell.
     pub fn of_frame(truth: &TrueCells, said: &Said) -> Self {
-        let cell_m = cell_size_m(truth.cell_size_mm);
         let count = |cells: &HashSet<CellIndex>, is: &dyn Fn(CellIndex) -> bool| {
             cells.iter().filter(|cell| is(**cell)).count() as u64
         };
         let said_near = |cell| near(&said.obstacles, cell);
         let truth_near = |cell| near(&truth.obstacles, cell);
-        let is_counted = |cell| is_judged(cell, cell_m) && (truth_near(cell) || near(&truth.free, cell));
+        let is_counted = |cell| is_counted(truth, cell);
         Self {
             frames: 1,
             obstacles: truth.obstacles.len() as u64,
@@ -135,7 +134,12 @@ impl CellCounts {
     }
 }
 
-fn near(cells: &HashSet<CellIndex>, cell: CellIndex) -> bool {
+/// Whether a reported cell says anything about the detector: it lies where cells are judged, within one cell of one that is.
+pub(super) fn is_counted(truth: &TrueCells, cell: CellIndex) -> bool {
+    is_judged(cell, cell_size_m(truth.cell_size_mm)) && (near(&truth.obstacles, cell) || near(&truth.free, cell))
+}
+
+pub(super) fn near(cells: &HashSet<CellIndex>, cell: CellIndex) -> bool {
     around(cell).any(|neighbour| cells.contains(&neighbour))
 }
 

@@ -15,6 +15,7 @@ mod disparity;
 mod draws;
 mod figures;
 mod lidar;
+mod mistakes;
 mod road;
 mod truth;
 
@@ -22,6 +23,7 @@ pub use cells::{CellCounts, CellScore, Said};
 pub use disparity::{DisparityCounts, DisparityScore};
 pub use figures::{CELL_FIGURES, DISPARITY_FIGURES, Figure};
 pub use lidar::{TrueCells, true_cells};
+pub use mistakes::{Mistake, mistakes};
 pub use road::NoRoad;
 pub use truth::RecordedTruth;
 
