@@ -91,6 +91,8 @@ pub fn summary<S>(input: &Input<S>, job: &Job<'_>, log: &Log, warnings: &[Warnin
     json!({
         "program": concat!("fencepost ", env!("CARGO_PKG_VERSION")),
         "recording": {"name": input.name, "description": input.description},
+        "detector": job.settings.detector,
+        "cross_check": job.settings.cross_check,
         "frames": {
             "detected": log.frames.len(),
             "failed": log.failures.len(),
@@ -150,6 +152,8 @@ fn counts(log: &Log) -> Value {
         "obstacles_dropped": sum(&|f| f.statistics.obstacles_dropped.into()),
         "cells_obstacle": sum(&|f| f.statistics.cells_obstacle.into()),
         "cells_free": sum(&|f| f.statistics.cells_free.into()),
+        "cells_disputed": sum(&|f| f.statistics.cells_disputed.into()),
+        "cells_unconfirmed": sum(&|f| f.statistics.cells_unconfirmed.into()),
         "cells_dropped": log.can.dropped_cells,
     })
 }

@@ -4,6 +4,8 @@ use fencepost_core::{
     detector::Stage,
     disparity::Reason,
     health::{Health, HealthLevel, HealthReason},
+    map::Doubt,
+    methods::{DetectorKind, Detectors},
     wire::NodeState,
 };
 
@@ -37,6 +39,32 @@ pub const fn reason_words(reason: Reason) -> &'static str {
         Reason::Saturated => "saturated",
         Reason::OutOfRange => "out of the disparity range",
     }
+}
+
+/// Why a cell is less than certain, as it is written in files; empty where nobody doubts it.
+pub const fn doubt_name(doubt: Doubt) -> &'static str {
+    match doubt {
+        Doubt::None => "",
+        Doubt::Unconfirmed => "unconfirmed",
+        Doubt::Disputed => "disputed",
+    }
+}
+
+/// How a detector works, in words.
+pub const fn detector_words(kind: DetectorKind) -> &'static str {
+    match kind {
+        DetectorKind::SurfaceNormals => "surfaces inside tiles, told apart by their normals",
+        DetectorKind::CostMap => "points above the ground counted in columns",
+        DetectorKind::GroundDeviation => "deviations from the disparity of the ground",
+        DetectorKind::DisparitySegments => "contiguous segments of disparity, judged by size and height",
+        DetectorKind::PixelNormals => "segments of pixels, told apart by the normal around each",
+    }
+}
+
+/// The detectors of a frame for people.
+pub fn detectors(detectors: Detectors) -> String {
+    let main = detectors.main().name();
+    detectors.cross_check().map_or_else(|| main.to_string(), |check| format!("{main}, checked by {}", check.name()))
 }
 
 /// What a stage does, in words.

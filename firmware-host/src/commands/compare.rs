@@ -22,6 +22,11 @@ use crate::{
 /// told by [`Ending::InputBad`].
 pub fn compare(args: &CompareArgs, console: &mut Console) -> Result<Ending, Failure> {
     let start = Instant::now();
+    if let Some(kind) = args.detector.methods.detector {
+        return Err(Failure::usage("the detectors to compare are told by --detectors")
+            .at(format!("--detector {}", kind.name()))
+            .mend("leave it out, or name several: --detectors A,B"));
+    }
     let config = Config::load(&args.detector)?;
     let mut input = Input::recording(&args.recording, &args.frames.0)?;
     let folder = OutputFolder::open(&args.out)?;

@@ -2,46 +2,53 @@
 
 use std::{fmt, str::FromStr};
 
-use fencepost_core::settings::Settings;
+use fencepost_core::{methods::DetectorKind, settings::Settings};
 
-use crate::reference::Reference;
+use crate::{reference::Reference, words};
 
 /// A detector, in the core or outside of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The paper's final method.
-    SurfaceNormals,
+    /// One of the core's.
+    Core(DetectorKind),
 }
 
 impl Method {
     /// Every detector, in the order of the report.
-    pub const ALL: [Self; 1] = [Self::SurfaceNormals];
+    pub const ALL: [Self; 5] = [
+        Self::Core(DetectorKind::SurfaceNormals),
+        Self::Core(DetectorKind::CostMap),
+        Self::Core(DetectorKind::GroundDeviation),
+        Self::Core(DetectorKind::DisparitySegments),
+        Self::Core(DetectorKind::PixelNormals),
+    ];
 
     /// Name on the command line, in files and of the folder that it writes to.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::SurfaceNormals => "surface-normals",
+            Self::Core(kind) => kind.name(),
         }
     }
 
-    /// How it works, in a sentence.
+    /// How it works, in words.
     pub const fn words(self) -> &'static str {
         match self {
-            Self::SurfaceNormals => {
-                "A plane for each surface inside tiles of 32 × 32 pixels; its normal tells ground from obstacle."
-            }
+            Self::Core(kind) => words::detector_words(kind),
         }
     }
 
-    /// The settings for it, made of those for all.
+    /// The settings for it, made of those for all. A detector does not check itself.
     #[must_use]
-    pub const fn settings(self, common: Settings) -> Settings {
-        common
+    pub fn settings(self, common: Settings) -> Settings {
+        let Self::Core(detector) = self;
+        Settings { detector, cross_check: common.cross_check.filter(|other| *other != detector), ..common }
     }
 
     /// What looks at the frames, where that is not the core.
     pub const fn reference(self) -> Option<&'static dyn Reference> {
-        None
+        match self {
+            Self::Core(_) => None,
+        }
     }
 }
 
@@ -68,6 +75,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_detector_of_the_core_can_be_compared() {
+        for kind in DetectorKind::ALL {
+            assert!(Method::ALL.contains(&Method::Core(kind)), "{}", kind.name());
+        }
+    }
+
+    #[test]
     fn every_detector_has_a_name_of_its_own() {
         for (k, method) in Method::ALL.into_iter().enumerate() {
             assert_eq!(method.name().parse(), Ok(method));
@@ -76,5 +90,15 @@ mod tests {
         }
         let error = "surfaces".parse::<Method>().unwrap_err();
         assert!(error.contains("surface-normals"), "{error}");
+    }
+
+    #[test]
+    fn a_detector_is_checked_by_another_one_only() {
+        let common = Settings { cross_check: Some(DetectorKind::CostMap), ..Settings::default() };
+        for method in Method::ALL {
+            let settings = method.settings(common);
+            assert_eq!(settings.check_detectors(), Ok(()), "{method}");
+            assert_eq!(settings.cross_check.is_none(), method == Method::Core(DetectorKind::CostMap), "{method}");
+        }
     }
 }
