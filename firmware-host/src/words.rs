@@ -99,6 +99,9 @@ pub fn tilt_deg(value: i16) -> f64 {
 /// A number of bytes for people.
 pub fn bytes(count: usize) -> String {
     const KIB: f64 = 1024.0;
+    if count < 1024 {
+        return format!("{count} B");
+    }
     let count = count as f64;
     if count >= KIB * KIB { format!("{:.1} MiB", count / (KIB * KIB)) } else { format!("{:.0} KiB", count / KIB) }
 }

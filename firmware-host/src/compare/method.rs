@@ -2,7 +2,10 @@
 
 use std::{fmt, str::FromStr};
 
-use fencepost_core::{methods::DetectorKind, settings::Settings};
+use fencepost_core::{
+    methods::{CostMap, DetectorKind, DisparitySegments, GroundDeviation, PixelNormals},
+    settings::Settings,
+};
 
 use crate::{reference::Reference, words};
 
@@ -42,6 +45,19 @@ impl Method {
     pub fn settings(self, common: Settings) -> Settings {
         let Self::Core(detector) = self;
         Settings { detector, cross_check: common.cross_check.filter(|other| *other != detector), ..common }
+    }
+
+    /// State that it alone has in the core's detector, bytes, for pictures of this `width`. All share the rest.
+    pub const fn own_bytes(self, width: u32) -> usize {
+        const COLUMNS: usize = 1024;
+        const PER_COLUMN: usize = (size_of::<PixelNormals<COLUMNS>>() - size_of::<PixelNormals<0>>()) / COLUMNS;
+        match self {
+            Self::Core(DetectorKind::SurfaceNormals) => 0,
+            Self::Core(DetectorKind::CostMap) => size_of::<CostMap>(),
+            Self::Core(DetectorKind::GroundDeviation) => size_of::<GroundDeviation>(),
+            Self::Core(DetectorKind::DisparitySegments) => size_of::<DisparitySegments>(),
+            Self::Core(DetectorKind::PixelNormals) => size_of::<PixelNormals<0>>() + PER_COLUMN * width as usize,
+        }
     }
 
     /// What looks at the frames, where that is not the core.
@@ -90,6 +106,12 @@ mod tests {
         }
         let error = "surfaces".parse::<Method>().unwrap_err();
         assert!(error.contains("surface-normals"), "{error}");
+    }
+
+    #[test]
+    fn a_detector_with_a_state_of_its_own_says_how_large_it_is() {
+        assert_eq!(Method::Core(DetectorKind::PixelNormals).own_bytes(640), size_of::<PixelNormals<640>>());
+        assert_eq!(Method::Core(DetectorKind::SurfaceNormals).own_bytes(640), 0);
     }
 
     #[test]

@@ -44,8 +44,10 @@ pub struct Outcome {
     pub log: Log,
     /// Pictures of the frames that are shown.
     pub pictures: Vec<SidePictures>,
-    /// What it holds in memory, bytes.
+    /// What it holds in memory, bytes: the core's detector for pictures of this size, and what is outside of it.
     pub memory_bytes: usize,
+    /// What of that no other detector needs, bytes.
+    pub own_memory_bytes: usize,
     /// Its `summary.json`.
     pub summary: Value,
 }
@@ -71,6 +73,7 @@ pub fn run<S: Source>(
     summary::write(&folder, "summary.json", &summary)?;
     let (width, height) = input.picture_size();
     let fitting = Capacities::for_pictures(width as usize, height as usize, usize::from(settings.matching.disparities));
-    let memory_bytes = memory_bytes(&fitting) + log.reference_memory_bytes;
-    Ok(Outcome { method, log, pictures: shown.into_frames(), memory_bytes, summary })
+    let outside = log.reference_memory_bytes;
+    let (memory_bytes, own_memory_bytes) = (memory_bytes(&fitting) + outside, method.own_bytes(width) + outside);
+    Ok(Outcome { method, log, pictures: shown.into_frames(), memory_bytes, own_memory_bytes, summary })
 }

@@ -50,6 +50,7 @@ struct Detector {
     p99_ms: String,
     bar_percent: f64,
     memory: String,
+    own_memory: String,
 }
 
 /// One kind of score: a row for each detector, a column for each figure.
@@ -168,6 +169,7 @@ fn detectors(outcomes: &[Outcome]) -> Vec<Detector> {
             p99_ms: milliseconds(times.p99_ms),
             bar_percent: 100.0 * times.median_ms / longest_ms,
             memory: words::bytes(outcome.memory_bytes),
+            own_memory: words::bytes(outcome.own_memory_bytes),
         }
     };
     outcomes.iter().map(detector).collect()

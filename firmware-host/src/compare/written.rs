@@ -22,6 +22,7 @@ fn detector(outcome: &Outcome) -> Value {
     fields.insert("name".to_string(), json!(outcome.method.name()));
     fields.insert("folder".to_string(), json!(outcome.method.name()));
     fields.insert("memory_bytes".to_string(), json!(outcome.memory_bytes));
+    fields.insert("own_memory_bytes".to_string(), json!(outcome.own_memory_bytes));
     for part in PARTS {
         fields.insert(part.to_string(), outcome.summary[part].clone());
     }
