@@ -3,6 +3,10 @@
 use std::{collections::HashMap, fs, path::Path, sync::Arc};
 
 use fencepost::{
+    cli::{CompareArgs, DetectorArgs, FrameRange},
+    commands::{self, Ending},
+    compare::Method,
+    console::Console,
     output::CellRow,
     score::{CellCounts, DisparityCounts, RecordedTruth, Said},
 };
@@ -65,6 +69,37 @@ fn disparity_of_the_program() {
         let (ours, disparity) = (score_in_summary(&out, "disparity"), out.join("disparity"));
         assert_same(&ours, &tool, &[recording.as_ref(), disparity.as_ref(), "--json".as_ref()], name);
         say!("{name}: the scores of its disparity here and there are the same: {ours}");
+    }
+}
+
+#[test]
+fn every_detector_of_a_comparison() {
+    let name = "kitti15-road";
+    let tools = ["score_cells.py", "score_disparity.py"].map(at_hand::scoring_tool);
+    let (Some(recording), [Some(cells_tool), Some(disparity_tool)]) = (at_hand::recording(name), tools) else { return };
+    let out = Path::new(super::SCRATCH).join("compared").join(name);
+    let args = CompareArgs {
+        recording: recording.clone(),
+        detectors: Method::ALL.to_vec(),
+        out: out.clone(),
+        frames: FrameRange::default(),
+        show: 1,
+        detector: DetectorArgs::default(),
+    };
+    let ending = commands::compare(&args, &mut Console::new(true, false)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    assert_eq!(ending, Ending::Good);
+    let written: Value = serde_json::from_str(&fs::read_to_string(out.join("compare.json")).unwrap()).unwrap();
+    let detectors = written["detectors"].as_array().unwrap();
+    assert_eq!(detectors.len(), Method::ALL.len());
+    for detector in detectors {
+        let folder = out.join(detector["folder"].as_str().unwrap());
+        let (cells, disparity) = (folder.join("cells.csv"), folder.join("disparity"));
+        let score = &detector["score"];
+        let what = format!("{name}, {}", detector["name"]);
+        assert_same(&score["cells"], &cells_tool, &[recording.as_ref(), cells.as_ref(), "--json".as_ref()], &what);
+        let arguments = [recording.as_ref(), disparity.as_ref(), "--json".as_ref()];
+        assert_same(&score["disparity"], &disparity_tool, &arguments, &what);
+        say!("{what}: the scores here and there are the same: {}", score["cells"]);
     }
 }
 
