@@ -7,9 +7,15 @@ use embedded_graphics::{
     primitives::{Circle, Line, PointsIter, PrimitiveStyle, Rectangle, Triangle},
     text::{Alignment, Baseline, Text, TextStyle, TextStyleBuilder},
 };
-use fencepost_core::map::{CellState, MapGeometry, UnknownReason};
+use fencepost_core::{
+    map::{Cell, CellState, Doubt, MapGeometry, UnknownReason},
+    methods::{DetectorKind, Detectors},
+};
 
-use super::{Canvas, colours::Colour};
+use super::{
+    Canvas,
+    colours::{Colour, mix},
+};
 use crate::{view::FrameView, words};
 
 const PAPER: Colour = [255, 255, 255];
@@ -21,6 +27,13 @@ const DOT: Colour = [186, 24, 22];
 const INK: Colour = [40, 42, 48];
 const GRID: Colour = [178, 182, 190];
 const VIEW: Colour = [36, 84, 170];
+const DISPUTED: Colour = [226, 124, 0];
+const UNCONFIRMED: Colour = [238, 196, 120];
+/// Cells by their cost, from none to the most: the paper, Figure 7, where lighter is costlier.
+const NO_COST: Colour = [44, 48, 58];
+const MOST_COST: Colour = [252, 250, 240];
+/// Cost that is as light as can be. Costs differ by orders of magnitude, as numbers of pixels do: light goes by their logarithm.
+const LIGHTEST: f32 = 2000.0;
 
 /// Longest edge of the map itself, px.
 const LONGEST_PX: f32 = 500.0;
@@ -28,6 +41,8 @@ const LEFT_PX: i32 = 58;
 const TOP_PX: i32 = 34;
 const RIGHT_PX: i32 = 22;
 const BOTTOM_PX: i32 = 76;
+/// A second row of the legend.
+const LEGEND_ROW_PX: i32 = 18;
 /// Metres from one line of the grid to the next.
 const GRID_M: i32 = 5;
 
@@ -35,7 +50,8 @@ const GRID_M: i32 = 5;
 pub fn birdseye(view: &FrameView<'_>) -> Canvas {
     let scale = Scale::new(view.detection.map.geometry);
     let (width, height) = scale.canvas_px();
-    let mut canvas = Canvas::new(width, height, PAPER);
+    let more = if legend(view.detection.detectors).len() > LEGEND_ROW { LEGEND_ROW_PX as usize } else { 0 };
+    let mut canvas = Canvas::new(width, height + more, PAPER);
     paint_cells(&mut canvas, &scale, view);
     paint_grid(&mut canvas, &scale);
     paint_field_of_view(&mut canvas, &scale, view);
@@ -106,18 +122,22 @@ impl Scale {
 }
 
 fn paint_cells(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
+    let has_cost = view.detection.detectors.main() == DetectorKind::CostMap;
     for (index, cell) in view.detection.map.cells.iter().enumerate() {
         let at = scale.cell(index);
+        let frame = match cell.doubt {
+            Doubt::None => None,
+            Doubt::Unconfirmed => Some(UNCONFIRMED),
+            Doubt::Disputed => Some(DISPUTED),
+        };
         for dy in 0..scale.px_per_cell {
             for dx in 0..scale.px_per_cell {
                 let (x, y) = (at.x + dx, at.y + dy);
-                let colour = match cell.state {
-                    CellState::Free => FREE,
-                    CellState::Obstacle => OBSTACLE,
-                    CellState::Unknown(UnknownReason::OutsideView) => UNKNOWN,
-                    CellState::Unknown(_) => [UNKNOWN, HATCH][usize::from((x + y).rem_euclid(6) == 0)],
-                };
-                canvas.set(x, y, colour);
+                let [nearest, farthest] = [dx.min(dy), dx.max(dy)];
+                let at_edge = nearest == 0 || farthest == scale.px_per_cell - 1;
+                let colour = if has_cost { cost_colour(cell) } else { None };
+                let colour = colour.unwrap_or_else(|| state_colour(cell.state, x, y));
+                canvas.set(x, y, frame.filter(|_| at_edge).unwrap_or(colour));
             }
         }
         if cell.state == CellState::Obstacle {
@@ -126,6 +146,21 @@ fn paint_cells(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
             draw(&Circle::with_center(centre, diameter).into_styled(PrimitiveStyle::with_fill(rgb(DOT))), canvas);
         }
     }
+}
+
+fn state_colour(state: CellState, x: i32, y: i32) -> Colour {
+    match state {
+        CellState::Free => FREE,
+        CellState::Obstacle => OBSTACLE,
+        CellState::Unknown(UnknownReason::OutsideView) => UNKNOWN,
+        CellState::Unknown(_) => [UNKNOWN, HATCH][usize::from((x + y).rem_euclid(6) == 0)],
+    }
+}
+
+/// Colour of a cell by its cost; `None` where nothing is known of it.
+fn cost_colour(cell: &Cell) -> Option<Colour> {
+    let known = cell.cost > 0 || !matches!(cell.state, CellState::Unknown(_));
+    known.then(|| mix(NO_COST, MOST_COST, ((1.0 + f32::from(cell.cost)).ln() / LIGHTEST.ln()).min(1.0)))
 }
 
 fn paint_grid(canvas: &mut Canvas, scale: &Scale) {
@@ -218,36 +253,59 @@ fn paint_words(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
     let axis = "y, metres to the left";
     draw(&Text::with_text_style(axis, Point::new(LEFT_PX + width / 2, TOP_PX + height + 24), plain, middle), canvas);
     draw_upward(canvas, "x, metres ahead", Point::new(6, TOP_PX + height / 2));
-    paint_legend(canvas, TOP_PX + height + 50);
+    let entries = legend(view.detection.detectors);
+    for (entries, row) in entries.chunks(LEGEND_ROW).zip(0..) {
+        paint_legend(canvas, TOP_PX + height + 50 + row * LEGEND_ROW_PX, entries);
+    }
 }
 
-fn paint_legend(canvas: &mut Canvas, y: i32) {
+/// Entries in a row of the legend.
+const LEGEND_ROW: usize = 4;
+
+/// A word of the legend, and what its patch looks like.
+struct Entry {
+    colour: Colour,
+    word: &'static str,
+    hatched: bool,
+    dot: bool,
+    frame: Colour,
+}
+
+/// What the map shows, in rows of [`LEGEND_ROW`].
+fn legend(detectors: Detectors) -> Vec<Entry> {
+    let plain = |colour, word| Entry { colour, word, hatched: false, dot: false, frame: INK };
+    let has_cost = detectors.main() == DetectorKind::CostMap;
+    let (obstacle, free) = if has_cost { (MOST_COST, NO_COST) } else { (OBSTACLE, FREE) };
+    let mut entries = vec![
+        Entry { dot: true, ..plain(obstacle, "obstacle") },
+        plain(free, "free"),
+        Entry { hatched: true, ..plain(UNKNOWN, "not known") },
+        plain(UNKNOWN, "out of view"),
+    ];
+    if has_cost {
+        entries.push(plain(mix(NO_COST, MOST_COST, 0.6), "lighter: costlier"));
+    }
+    if detectors.cross_check().is_some() {
+        entries.push(Entry { frame: DISPUTED, ..plain(PAPER, "disputed") });
+        entries.push(Entry { frame: UNCONFIRMED, ..plain(PAPER, "unconfirmed") });
+    }
+    entries
+}
+
+fn paint_legend(canvas: &mut Canvas, y: i32, entries: &[Entry]) {
     let plain = MonoTextStyle::new(&FONT_8X13, rgb(INK));
     let mut x = 12;
-    for (colour, hatched, word) in [
-        (OBSTACLE, false, "obstacle"),
-        (FREE, false, "free"),
-        (UNKNOWN, true, "not known"),
-        (UNKNOWN, false, "out of view"),
-    ] {
+    for Entry { colour, word, hatched, dot, frame } in entries {
         for dy in 0..13 {
             for dx in 0..13 {
-                let edge = dx == 0 || dy == 0 || dx == 12 || dy == 12;
-                let line = hatched && (x + dx + y + dy).rem_euclid(6) == 0;
-                canvas.set(
-                    x + dx,
-                    y + dy,
-                    if edge {
-                        INK
-                    } else if line {
-                        HATCH
-                    } else {
-                        colour
-                    },
-                );
+                let thick = if *frame == INK { 0 } else { 1 };
+                let edge = dx.min(dy) <= thick || dx.max(dy) >= 12 - thick;
+                let line = *hatched && (x + dx + y + dy).rem_euclid(6) == 0;
+                let inner = if line { HATCH } else { *colour };
+                canvas.set(x + dx, y + dy, if edge { *frame } else { inner });
             }
         }
-        if word == "obstacle" {
+        if *dot {
             let dot = Circle::new(Point::new(x + 3, y + 3), 7);
             draw(&dot.into_styled(PrimitiveStyle::with_fill(rgb(DOT))), canvas);
         }
@@ -302,6 +360,36 @@ mod tests {
                 assert_ne!(colour, DOT, "cell ({i}, {j})");
             }
         }
+    }
+
+    #[test]
+    fn doubt_has_a_frame_and_costs_are_lighter_the_higher_they_are() {
+        let mut made_up = MadeUp::new();
+        let geometry = made_up.detection.map.geometry;
+        let doubts = [(5, Doubt::Disputed, DISPUTED), (6, Doubt::Unconfirmed, UNCONFIRMED)];
+        for (i, doubt, _) in doubts {
+            made_up.detection.map.cells[geometry.index(i, 0).unwrap()].doubt = doubt;
+        }
+        let scale = Scale::new(geometry);
+        let canvas = made_up.view(birdseye);
+        for (i, _, colour) in doubts {
+            let at = scale.cell(geometry.index(i, 0).unwrap());
+            // The lines of the grid lie over the cells' edges; this pixel is beside one.
+            assert_eq!(canvas.get(at.x as usize + 1, at.y as usize), colour, "cell ({i}, 0)");
+        }
+
+        made_up.detection.detectors = Detectors::new(DetectorKind::CostMap, None);
+        for (i, cost) in [(5, 0), (6, 1), (7, 30), (8, 3000)] {
+            let cell = &mut made_up.detection.map.cells[geometry.index(i, 3).unwrap()];
+            *cell = Cell { state: CellState::Free, cost, ..Cell::default() };
+        }
+        let canvas = made_up.view(birdseye);
+        let light = [5, 6, 7, 8].map(|i| {
+            let at = scale.cell(geometry.index(i, 3).unwrap());
+            canvas.get(at.x as usize + 3, at.y as usize + 3)
+        });
+        assert_eq!((light[0], light[3]), (NO_COST, MOST_COST));
+        assert!(light.is_sorted_by(|a, b| (0..3).all(|i| a[i] < b[i])), "{light:?}");
     }
 
     #[test]
