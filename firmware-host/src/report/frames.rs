@@ -1,6 +1,14 @@
 //! The figures of one frame.
 
-use fencepost_core::{disparity::Reason, geometry::RectifiedPair, obstacles::Obstacle, settings::Settings};
+use std::borrow::Cow;
+
+use fencepost_core::{
+    disparity::Reason,
+    geometry::RectifiedPair,
+    methods::{DetectorKind, Detectors},
+    obstacles::Obstacle,
+    settings::Settings,
+};
 use serde::Serialize;
 
 use super::{Embedded, Painter};
@@ -35,7 +43,7 @@ pub struct ReportFrame {
 struct Figure {
     letter: &'static str,
     title: &'static str,
-    caption: &'static str,
+    caption: Cow<'static, str>,
     #[serde(flatten)]
     picture: Embedded,
 }
@@ -100,7 +108,7 @@ impl ReportFrame {
             health: words::level_name(view.health.level),
             health_words: words::reasons_in_words(view.health),
             figures: camera_figures(&figures),
-            map: figure("h", "Bird’s-eye map", MAP_CAPTION, &birdseye(view)),
+            map: figure("h", "Bird’s-eye map", map_caption(view.detection.detectors), &birdseye(view)),
             scale: scale(view.pair, figures.scale_px),
             reasons: Reason::ALL.map(share).into(),
             seen_percent: percent(statistics.pixels_with_disparity),
@@ -122,6 +130,22 @@ impl ReportFrame {
 const MAP_CAPTION: &str = "The robot stands at (0, 0) and looks up. Red dots are obstacle cells, light cells are free \
     ground, hatched cells are in view but not known, grey ones are out of view. Strokes show how long each obstacle is and \
     how it lies; the dashed lines bound the view of the left camera.";
+
+/// The caption of the map, with what is special about the detectors.
+fn map_caption(detectors: Detectors) -> String {
+    let mut caption = MAP_CAPTION.to_string();
+    if detectors.main() == DetectorKind::CostMap {
+        caption.push_str(" The lighter a cell, the higher its cost: the number of points above its ground.");
+    }
+    if let Some(check) = detectors.cross_check() {
+        caption.push_str(&format!(
+            " Cells framed in orange are disputed: {} says the opposite, and what it calls an obstacle is not free; those framed in \
+             light orange it does not know.",
+            check.name()
+        ));
+    }
+    caption
+}
 
 fn camera_figures(figures: &Figures<'_>) -> Vec<Figure> {
     vec![
@@ -166,8 +190,8 @@ fn camera_figures(figures: &Figures<'_>) -> Vec<Figure> {
     ]
 }
 
-fn figure(letter: &'static str, title: &'static str, caption: &'static str, canvas: &Canvas) -> Figure {
-    Figure { letter, title, caption, picture: Embedded::new(canvas, WIDEST) }
+fn figure(letter: &'static str, title: &'static str, caption: impl Into<Cow<'static, str>>, canvas: &Canvas) -> Figure {
+    Figure { letter, title, caption: caption.into(), picture: Embedded::new(canvas, WIDEST) }
 }
 
 /// The disparities between which 98 of 100 pixels lie: the whole range searched would leave most pictures dark.
