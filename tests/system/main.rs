@@ -12,6 +12,8 @@ mod joining;
 mod rover;
 mod scoring;
 mod slope;
+mod steadiness;
+mod stereoboard;
 
 use std::path::Path;
 
