@@ -136,7 +136,7 @@ pub struct ReplayArgs {
 pub struct CompareArgs {
     /// Folder of the recording.
     pub recording: PathBuf,
-    /// The detectors, separated by commas; all of them if left out.
+    /// The detectors, separated by commas; all of them if left out. `normalized-cuts` takes seconds for a frame.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', default_values_t = Method::ALL)]
     pub detectors: Vec<Method>,
     /// Folder to write to; made if it is not there. Files of an earlier run are replaced.

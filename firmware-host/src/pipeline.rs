@@ -9,7 +9,6 @@ use fencepost_core::{
     picture::Picture,
     rectify::Side,
     settings::Settings,
-    surfaces::Surface,
     wire::{WireConfig, WireSettings},
 };
 use fencepost_hal::camera::StereoPair;
@@ -21,6 +20,7 @@ use crate::{
     console::Console,
     detector::{self, ProgramDetector},
     error::Failure,
+    normalized_cuts::NormalizedCutSettings,
     output::{CellRow, OutputFolder, Tables},
     paint,
     reference::Reference,
@@ -43,8 +43,8 @@ pub struct Job<'a> {
     pub show: usize,
     /// Settings of the detector.
     pub settings: Settings,
-    /// A detector outside the core that has the last word.
-    pub reference: Option<&'a dyn Reference>,
+    /// Settings of the detector outside the core, where that has the last word.
+    pub normalized_cuts: Option<NormalizedCutSettings>,
     /// Settings of the bus.
     pub wire: WireSettings,
     /// The configuration file, for errors.
@@ -62,8 +62,6 @@ pub struct Log {
     pub can: CanCounts,
     /// What it is worth, where the recording brings the truth.
     pub scores: Option<Scores>,
-    /// Most memory that a detector outside the core held, bytes.
-    pub reference_memory_bytes: usize,
 }
 
 /// What is kept of each frame.
@@ -133,6 +131,7 @@ struct Pipeline<'a, P: Painter> {
     can: CanLog,
     shown: Shown<P>,
     scorer: Option<Scorer>,
+    reference: Option<Reference>,
     log: Log,
     /// The left rectified picture, where pictures are wanted.
     left: Vec<u8>,
@@ -141,6 +140,9 @@ struct Pipeline<'a, P: Painter> {
 impl<'a, P: Painter> Pipeline<'a, P> {
     fn start<S>(job: &'a Job<'a>, painter: P, detector: &ProgramDetector, input: &Input<S>) -> Result<Self, Failure> {
         let config = WireConfig::new(job.wire).map_err(|e| Failure::config(e, job.config.file.as_deref()))?;
+        let reference = job.normalized_cuts.as_ref();
+        let reference =
+            reference.map(|cuts| Reference::new(cuts, &job.settings, detector, &input.mount)).transpose()?;
         let folder = job.folder;
         let wants = |output| job.write.contains(&output);
         for (output, name) in [(Output::Disparity, "disparity"), (Output::Classes, "classes"), (Output::Map, "map")] {
@@ -154,6 +156,7 @@ impl<'a, P: Painter> Pipeline<'a, P> {
             tables: if wants(Output::Cells) { Some(Tables::create(folder)?) } else { None },
             can: CanLog::create(wants(Output::Can).then_some(folder), config)?,
             shown: Shown::new(painter, job.show, input.frames),
+            reference,
             scorer: input.truth.clone().map(|truth| Scorer::new(truth, job.settings.map.geometry)),
             log: Log::default(),
             left: vec![0; width * height],
@@ -232,21 +235,15 @@ impl<'a, P: Painter> Pipeline<'a, P> {
             surface_at: &surface_at,
         };
         let start = Instant::now();
-        let seen = self.job.reference.map(|reference| reference.look(&view)).transpose().map_err(FrameError::Frame)?;
-        let own = seen.as_ref().map(|seen| seen.over(detection));
-        let detection = own.as_deref().unwrap_or(detection);
-        let (width, _) = view.size();
-        let class_at = |x: usize, y: usize| {
-            let class = seen.as_ref()?.class_at(x, y, width)?;
-            Some(Surface { class, ..Surface::default() })
-        };
+        let seen = self.reference.as_ref().map(|reference| reference.look(&view));
+        let seen_at = |x: usize, y: usize| seen.as_ref().and_then(|seen| seen.surface_at(x, y));
         if let Some(seen) = &seen {
             times.reference_ms = milliseconds(start.elapsed());
             times.total_ms += times.reference_ms;
-            self.log.reference_memory_bytes = self.log.reference_memory_bytes.max(seen.memory_bytes);
-            view.detection = detection;
-            view.surface_at = &class_at;
+            view.detection = seen.detection();
+            view.surface_at = &seen_at;
         }
+        let detection = view.detection;
         let sent = self.can.scan(&view)?;
         view.health = self.can.health();
         times.wire_ms = milliseconds(sent.encoding);
@@ -278,7 +275,7 @@ impl<'a, P: Painter> Pipeline<'a, P> {
     }
 
     fn needs_left(&self) -> bool {
-        self.wants(Output::Classes) || self.shown.wants_frame() || self.job.reference.is_some()
+        self.wants(Output::Classes) || self.shown.wants_frame() || self.reference.is_some()
     }
 
     /// The pictures of a frame; made after its times were taken.

@@ -45,7 +45,7 @@ pub fn stage_times(frames: &[FrameRecord]) -> Vec<StageTimes> {
     if frames.iter().any(|frame| frame.times.reference_ms > 0.0) {
         stages.push(StageTimes {
             name: "reference",
-            words: "looks at the frame outside the core",
+            words: "segments the picture by normalized cuts, outside the core",
             times: TimeSummary::of(frames.iter().map(|frame| frame.times.reference_ms)),
         });
     }

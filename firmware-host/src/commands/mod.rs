@@ -72,7 +72,7 @@ fn detect_and_write<S: Source>(
     }
     let settings = config.settings_for(input.picture_size().0);
     let show = if write.contains(&Output::Report) { report::SHOWN } else { 0 };
-    let job = Job { folder: &folder, write, show, settings, reference: None, wire: config.wire, config };
+    let job = Job { folder: &folder, write, show, settings, normalized_cuts: None, wire: config.wire, config };
     console.note(format_args!("{}: {} frames, {}", input.name, input.frames, input.description));
     let (log, report) = pipeline::run(input, &job, FramePainter, console, progress)?;
 

@@ -44,10 +44,10 @@ pub struct Outcome {
     pub log: Log,
     /// Pictures of the frames that are shown.
     pub pictures: Vec<SidePictures>,
-    /// What it holds in memory, bytes: the core's detector for pictures of this size, and what is outside of it.
-    pub memory_bytes: usize,
+    /// What it holds in memory for pictures of this size, bytes; `None` where that is not bounded.
+    pub memory_bytes: Option<usize>,
     /// What of that no other detector needs, bytes.
-    pub own_memory_bytes: usize,
+    pub own_memory_bytes: Option<usize>,
     /// Its `summary.json`.
     pub summary: Value,
 }
@@ -65,15 +65,15 @@ pub fn run<S: Source>(
 ) -> Result<Outcome, Failure> {
     let folder = OutputFolder::open(&folder.path().join(method.name()))?;
     let settings = method.settings(config.settings_for(input.picture_size().0));
-    let reference = method.reference();
-    let job = Job { folder: &folder, write: &WRITE, show, settings, reference, wire: config.wire, config };
+    let normalized_cuts = method.normalized_cuts();
+    let job = Job { folder: &folder, write: &WRITE, show, settings, normalized_cuts, wire: config.wire, config };
     let painter = SidePainter { truth: input.truth.clone() };
     let (log, shown) = pipeline::run(input, &job, painter, console, method.name())?;
     let summary = summary::summary(input, &job, &log, console.warnings());
     summary::write(&folder, "summary.json", &summary)?;
     let (width, height) = input.picture_size();
     let fitting = Capacities::for_pictures(width as usize, height as usize, usize::from(settings.matching.disparities));
-    let outside = log.reference_memory_bytes;
-    let (memory_bytes, own_memory_bytes) = (memory_bytes(&fitting) + outside, method.own_bytes(width) + outside);
+    let own_memory_bytes = method.own_bytes(width);
+    let memory_bytes = own_memory_bytes.map(|_| memory_bytes(&fitting));
     Ok(Outcome { method, log, pictures: shown.into_frames(), memory_bytes, own_memory_bytes, summary })
 }

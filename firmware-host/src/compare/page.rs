@@ -168,8 +168,8 @@ fn detectors(outcomes: &[Outcome]) -> Vec<Detector> {
             total_ms: milliseconds(times.median_ms),
             p99_ms: milliseconds(times.p99_ms),
             bar_percent: 100.0 * times.median_ms / longest_ms,
-            memory: words::bytes(outcome.memory_bytes),
-            own_memory: words::bytes(outcome.own_memory_bytes),
+            memory: memory(outcome.memory_bytes),
+            own_memory: memory(outcome.own_memory_bytes),
         }
     };
     outcomes.iter().map(detector).collect()
@@ -276,6 +276,10 @@ fn health(outcome: &Outcome) -> HealthRow {
         levels: words::LEVELS.map(words::level_name).map(level).into(),
         ground_seen: outcome.log.frames.iter().filter(|f| f.ground.is_some_and(|g| g.age_frames == 0)).count(),
     }
+}
+
+fn memory(bytes: Option<usize>) -> String {
+    bytes.map_or_else(|| "heap".to_string(), words::bytes)
 }
 
 fn milliseconds(ms: f64) -> String {

@@ -22,7 +22,7 @@ pub fn table(outcomes: &[Outcome]) -> String {
             figure(cells.map(|s| s.free_found)),
             total.median_ms,
             total.p99_ms,
-            words::bytes(*memory_bytes),
+            memory_bytes.map_or_else(|| "heap".to_string(), words::bytes),
         ));
     }
     lines.join("\n")
