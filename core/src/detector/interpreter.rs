@@ -241,3 +241,7 @@ fn view<'a, const DISPARITIES: usize>(setup: &'a Setup, depth: &'a DepthTable<DI
     let Setup { pair, frame, place, rays, nearest_m, .. } = setup;
     View { pair, frame, place, rays, depth, nearest_m: *nearest_m }
 }
+
+#[cfg(test)]
+#[path = "interpreter_tests.rs"]
+mod tests;

@@ -20,7 +20,8 @@ use crate::{
 /// same for every window.
 ///
 /// The window takes in all pixels with a disparity. One that lies across an edge does not fit a plane; its pixel takes the class of
-/// the nearest pixel on the same surface whose window does, at most half a window away. That way an edge is told as sharply as
+/// the nearest pixel on the same surface whose window does, at most as many steps along columns and rows away as lie between the
+/// middle of a window and its corner. That way an edge is told as sharply as
 /// the disparities have it.
 ///
 /// # Bound
@@ -137,7 +138,7 @@ impl<const WIDTH: usize> PixelNormals<WIDTH> {
     /// Gives pixels without a class that of the nearest pixel that has one, along pixels of contiguous disparity, forth and back.
     fn adopt(&self, picture: DisparityPicture<'_>, steps_of: &impl Fn(&DisparityPixel) -> u16, codes: &mut [u8]) {
         let (width, height, step) = (picture.width(), picture.height(), self.step_sixteenths);
-        let farthest = ONE_AWAY * (self.settings.window / 2) as u8;
+        let farthest = ONE_AWAY * (self.settings.window - self.settings.window % 2) as u8;
         let pixels = picture.pixels();
         let mut take = |at: usize, from: usize| {
             let (Some(&here), Some(&there)) = (codes.get(at), codes.get(from)) else { return };

@@ -15,7 +15,8 @@ pub struct CostMapSettings {
     /// ... and if its mean lies no farther than this from the level that the mount promises, metres: roofs and table tops are
     /// flat, too.
     pub max_level_m: f32,
-    /// Fewer columns give no plane; the level of the mount takes its place.
+    /// Fewer columns give no plane; the level of the mount takes its place. On any slope some columns are cut off at the edge of the
+    /// picture, and their rest is flat.
     pub min_columns: u16,
     /// Points from this height above the plane on are obstacle points, metres. The paper, section 4.1: 0.25.
     pub min_height_m: f32,
@@ -108,7 +109,7 @@ impl Default for CostMapSettings {
             max_deviation_m: 0.03,
             min_points: 10,
             max_level_m: 0.5,
-            min_columns: 8,
+            min_columns: 24,
             min_height_m: 0.25,
             max_height_m: 1.25,
             obstacle_cost: 20,
