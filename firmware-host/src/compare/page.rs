@@ -1,8 +1,9 @@
 //! `report.html` of a comparison.
 
+use fencepost_core::methods::DetectorKind;
 use serde::Serialize;
 
-use super::{Outcome, SidePictures, pictures::mistake_colour};
+use super::{Method, Outcome, SidePictures, pictures::mistake_colour};
 use crate::{
     console::WarningCount,
     error::Failure,
@@ -33,6 +34,7 @@ struct Page<'a> {
     ground_colour: String,
     obstacle_colour: String,
     mistakes: Vec<MistakeKey>,
+    has_costs: bool,
 }
 
 /// What the frame around a cell means.
@@ -140,6 +142,7 @@ pub fn page<S>(input: &Input<S>, outcomes: &[Outcome], warnings: &[WarningCount]
             ground_colour: paint::hex(paint::GROUND),
             obstacle_colour: paint::hex(paint::OBSTACLE),
             mistakes: mistake_keys(outcomes),
+            has_costs: outcomes.iter().any(|o| o.method == Method::Core(DetectorKind::CostMap)),
         },
     )
 }
@@ -159,7 +162,10 @@ fn mistake_keys(outcomes: &[Outcome]) -> Vec<MistakeKey> {
 fn detectors(outcomes: &[Outcome]) -> Vec<Detector> {
     let total =
         |outcome: &Outcome| summary::stage_times(&outcome.log.frames).pop().map(|s| s.times).unwrap_or_default();
-    let longest_ms = outcomes.iter().map(|outcome| total(outcome).median_ms).fold(1.0e-9, f64::max);
+    // One that no robot would run would dwarf the bars of the others and goes without.
+    let has_bar = |outcome: &Outcome| outcome.memory_bytes.is_some();
+    let longest_ms =
+        outcomes.iter().filter(|o| has_bar(o)).map(|outcome| total(outcome).median_ms).fold(1.0e-9, f64::max);
     let detector = |outcome: &Outcome| {
         let times = total(outcome);
         Detector {
@@ -167,7 +173,7 @@ fn detectors(outcomes: &[Outcome]) -> Vec<Detector> {
             words: outcome.method.words(),
             total_ms: milliseconds(times.median_ms),
             p99_ms: milliseconds(times.p99_ms),
-            bar_percent: 100.0 * times.median_ms / longest_ms,
+            bar_percent: if has_bar(outcome) { 100.0 * times.median_ms / longest_ms } else { 0.0 },
             memory: memory(outcome.memory_bytes),
             own_memory: memory(outcome.own_memory_bytes),
         }
