@@ -4,6 +4,7 @@
 
 mod can_log;
 mod cells;
+mod detectors;
 mod disparity;
 mod golden;
 mod ground;

@@ -96,7 +96,14 @@ impl Cell {
 
 impl Default for Cell {
     fn default() -> Self {
-        Self { confidence_percent: 0, ..Self::CERTAIN }
+        Self {
+            state: CellState::Unknown(UnknownReason::OutsideView),
+            pixels: 0,
+            height_dm: 0,
+            cost: 0,
+            confidence_percent: 0,
+            doubt: Doubt::None,
+        }
     }
 }
 
