@@ -134,8 +134,8 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
 
     /// What a pixel says of the cell at `[x, y]` of the vehicle frame, metres.
     pub(crate) fn vote(&mut self, [x, y]: [f32; 2], vote: Vote) {
-        let Some(index) = self.settings.geometry.index_at(x, y) else { return };
-        let evidence = &mut self.evidence[index];
+        let place = self.settings.geometry.index_at(x, y);
+        let Some(evidence) = place.and_then(|place| self.evidence.get_mut(place)) else { return };
         match vote {
             Vote::Ground => evidence.ground = evidence.ground.saturating_add(1),
             Vote::Obstacle { height_m } => {

@@ -148,7 +148,9 @@ impl<const WIDTH: usize> PixelNormals<WIDTH> {
             }
             let (Some(a), Some(b)) = (pixels.get(at).map(steps_of), pixels.get(from).map(steps_of)) else { return };
             if a != 0 && b != 0 && a.abs_diff(b) <= step {
-                codes[at] = there + ONE_AWAY;
+                if let Some(code) = codes.get_mut(at) {
+                    *code = there + ONE_AWAY;
+                }
             }
         };
         for y in 0..height {
