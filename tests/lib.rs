@@ -5,6 +5,7 @@
 pub mod at_hand;
 pub mod golden;
 pub mod replay;
+pub mod steadiness;
 pub mod table;
 
 /// Prints a line past the test runner's capture, so that figures and tests that did not run are seen in every run.

@@ -27,6 +27,7 @@ pub mod detector;
 pub mod error;
 pub mod listen;
 pub mod live;
+pub mod normalized_cuts;
 pub mod output;
 pub mod paint;
 pub mod pipeline;

@@ -12,6 +12,8 @@ mod health;
 mod joining;
 mod rover;
 mod slope;
+mod steadiness;
+mod stereoboard;
 
 use std::path::Path;
 

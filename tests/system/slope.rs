@@ -1,7 +1,7 @@
-//! A slope of 10 degrees is ground.
+//! Slopes, crests and dips are ground, and what stands on them is found.
 
 use fencepost_core::map::CellState;
-use fencepost_hal::scene::{Content, SceneOptions, TruthCell};
+use fencepost_hal::scene::{COURSE, Content, Scene, SceneOptions, TruthCell};
 use fencepost_tests::say;
 
 use super::cells::for_each_frame;
@@ -94,4 +94,141 @@ fn what_stands_on_a_slope_is_found_and_the_slope_is_free() {
         }
     }
     assert_eq!(bad, [""; 0], "more than 5 % of the clear cells are called obstacles, or too little is found");
+}
+
+/// Slopes, degrees, and how far they tilt to the side.
+const SLOPES_DEG: [f32; 7] = [-15.0, -10.0, -5.0, 0.0, 5.0, 10.0, 15.0];
+const TILTS_DEG: [f32; 3] = [-5.0, 0.0, 5.0];
+
+/// Where slopes begin that the vehicle stands before, metres ahead.
+const AHEAD_M: [f32; 2] = [2.5, 5.0];
+
+#[test]
+fn a_vehicle_on_any_slope_finds_what_stands_on_it_and_nothing_else() {
+    let slopes = SLOPES_DEG.iter().flat_map(|slope_deg| TILTS_DEG.map(|tilt_deg| (*slope_deg, tilt_deg)));
+    let options = slopes.map(|(slope_deg, slope_aside_deg)| SceneOptions {
+        slope_deg,
+        slope_aside_deg,
+        slope_start_m: -30.0,
+        ..course()
+    });
+    judge("on slopes", options);
+}
+
+#[test]
+fn slopes_ahead_are_no_obstacles_and_what_stands_on_them_is() {
+    let slopes = SLOPES_DEG.iter().filter(|slope_deg| **slope_deg != 0.0);
+    let tilted = slopes.flat_map(|slope_deg| TILTS_DEG.map(|tilt_deg| (*slope_deg, tilt_deg)));
+    let options = tilted.flat_map(|(slope_deg, slope_aside_deg)| {
+        // Of a slope that falls away from farther ahead there is little to be seen.
+        let starts = if slope_deg > 0.0 { &AHEAD_M[..] } else { &AHEAD_M[..1] };
+        starts.iter().map(move |start| SceneOptions { slope_deg, slope_aside_deg, slope_start_m: *start, ..course() })
+    });
+    judge("before slopes", options);
+}
+
+#[test]
+fn crests_and_dips_are_no_obstacles_and_what_stands_on_them_is() {
+    let turns = [(10.0, -10.0), (8.0, -12.0), (-10.0, 10.0), (-8.0, 12.0)];
+    let tilted = turns.into_iter().flat_map(|turn| TILTS_DEG.map(|tilt_deg| (turn, tilt_deg)));
+    let options = tilted.map(|((slope_deg, slope_after_deg), slope_aside_deg)| SceneOptions {
+        slope_deg,
+        slope_after_deg,
+        slope_aside_deg,
+        slope_start_m: 2.0,
+        slope_length_m: 4.0,
+        ..course()
+    });
+    judge("before crests and dips", options);
+}
+
+/// Crates and posts. One frame of each: there are many slopes, and a detector that has just been started must not fail.
+fn course() -> SceneOptions {
+    SceneOptions { content: Content::Course, frames: 1, ..SceneOptions::default() }
+}
+
+/// What was made of the things of the course and the ground between them.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    /// Things that are in plain view of both cameras, and those of them with an obstacle cell within one cell.
+    things: usize,
+    things_found: usize,
+    /// Where the others are, metres.
+    missed_m: Vec<(f32, f32)>,
+    /// Obstacle cells with no thing within one cell, metres, wherever they are.
+    false_m: Vec<(f32, f32)>,
+    /// Cells where ground is seen, and those of them that are called free.
+    clear: usize,
+    clear_called_free: usize,
+}
+
+impl Found {
+    fn of(options: SceneOptions) -> Self {
+        let mut found = Self::default();
+        for_each_frame(options, |scene, frame, detector| found.look(scene, frame, &detector.detection().map));
+        found
+    }
+
+    fn look<const CELLS: usize>(&mut self, scene: &Scene, frame: u32, map: &fencepost_core::map::ObstacleMap<CELLS>) {
+        let truth = scene.truth(frame).cells;
+        let at = |i: i16, j: i16| map.geometry.index(i, j).map(|index| map.cells[index].state);
+        let near = |i: i16, j: i16, is: &dyn Fn(i16, i16) -> bool| (-1..=1).any(|a| (-1..=1).any(|b| is(i + a, j + b)));
+        let places: Vec<_> = (0..COURSE.len()).filter_map(|thing| scene.course_cell(thing, frame)).collect();
+        for (i, j) in &places {
+            let in_view = near(*i, *j, &|a, b| truth.get(a, b) == TruthCell::Obstacle);
+            let is_found = near(*i, *j, &|a, b| at(a, b) == Some(CellState::Obstacle));
+            self.things += usize::from(in_view);
+            self.things_found += usize::from(in_view && is_found);
+            if in_view && !is_found {
+                self.missed_m.push(map.geometry.centre_m(*i, *j));
+            }
+        }
+        for (index, cell) in map.cells.iter().enumerate() {
+            let (i, j) = map.geometry.cell_at(index);
+            let is_thing = near(i, j, &|a, b| places.contains(&(a, b)) || truth.get(a, b) == TruthCell::Obstacle);
+            let is_clear = truth.get(i, j) == TruthCell::Free && !is_thing;
+            self.clear += usize::from(is_clear);
+            self.clear_called_free += usize::from(is_clear && cell.state == CellState::Free);
+            if cell.state == CellState::Obstacle && !is_thing {
+                self.false_m.push(map.geometry.centre_m(i, j));
+            }
+        }
+    }
+}
+
+fn judge(what: &str, all: impl Iterator<Item = SceneOptions>) {
+    let (mut bad, mut total) = (Vec::new(), Found::default());
+    for options in all {
+        let SceneOptions { slope_deg, slope_aside_deg, slope_start_m, slope_after_deg, .. } = options;
+        let after = if slope_after_deg == 0.0 { String::new() } else { format!(", then {slope_after_deg}°") };
+        let name = format!("{slope_deg}°, to the side {slope_aside_deg}°, from {slope_start_m} m{after}");
+        let found = Found::of(options);
+        let good = found.false_m.is_empty() && found.things_found == found.things;
+        if !good {
+            say!(
+                "{name}: {} of {} things found, not at {:?}; {} false obstacle cells {:?}",
+                found.things_found,
+                found.things,
+                found.missed_m,
+                found.false_m.len(),
+                &found.false_m[..found.false_m.len().min(6)]
+            );
+            bad.push(name);
+        }
+        total.things += found.things;
+        total.things_found += found.things_found;
+        total.clear += found.clear;
+        total.clear_called_free += found.clear_called_free;
+        total.false_m.extend(found.false_m);
+    }
+    say!(
+        "{what}: {} of {} things found, {} false obstacle cells, {} of {} clear cells free",
+        total.things_found,
+        total.things,
+        total.false_m.len(),
+        total.clear_called_free,
+        total.clear
+    );
+    assert!(total.things > 40, "{what}: there is something to find: {}", total.things);
+    assert_eq!(bad, [""; 0], "{what}: false obstacle cells, or things that are not found");
 }

@@ -39,26 +39,54 @@ impl Trail {
     }
 }
 
+/// Level ground up to a line, a plane that rises or falls from there on, and what comes after it. The line lies across the
+/// way of the plane's fall, so that a plane that is tilted sideways begins along an oblique line and nothing steps.
 #[derive(Clone, Copy, Debug)]
 struct Slope {
     tangent: f32,
+    /// Rise per metre to the left.
+    tangent_aside: f32,
+    /// Rise per metre ahead beyond the slope.
+    tangent_after: f32,
     start: Option<f32>,
+    length_m: f32,
 }
 
 impl Slope {
     /// The slope begins and ends over a length, as hills do.
     const BEND_M: f32 = 0.8;
-    const LENGTH_M: f32 = 34.0;
 
-    fn z(self, x: f32) -> f32 {
+    fn new(options: &SceneOptions) -> Self {
+        let [tangent, tangent_aside, tangent_after] =
+            [options.slope_deg, options.slope_aside_deg, options.slope_after_deg]
+                .map(|deg| libm::tanf(deg.to_radians()));
+        // Ground that only tilts sideways has no line where it could begin.
+        let begins = options.slope_start_m > -20.0 && (tangent != 0.0 || tangent_aside == 0.0);
+        let start = begins.then_some(options.slope_start_m);
+        Self { tangent, tangent_aside, tangent_after, start, length_m: options.slope_length_m }
+    }
+
+    fn z(self, x: f32, y: f32) -> f32 {
         let ramp = |u: f32| {
             let bent = u.clamp(0.0, Self::BEND_M);
             bent * bent * (0.5 / Self::BEND_M) + (u - Self::BEND_M).max(0.0)
         };
         match self.start {
-            None => self.tangent * x,
-            Some(start) => self.tangent * (ramp(x - start) - ramp(x - start - Self::LENGTH_M)),
+            None => self.tangent * x + self.tangent_aside * y,
+            Some(start) => {
+                let oblique = if self.tangent_aside == 0.0 { 0.0 } else { self.tangent_aside / self.tangent * y };
+                let u = x - start + oblique;
+                self.tangent * (ramp(u) - ramp(u - self.length_m)) + self.tangent_after * ramp(u - self.length_m)
+            }
         }
+    }
+
+    /// Rise per metre that no part of it exceeds, along x and along y.
+    fn steepest(self) -> [f32; 2] {
+        let ahead = self.tangent.abs().max(self.tangent_after.abs());
+        // Beyond the slope the tilt to the side is as much greater or smaller as the rise ahead.
+        let part = if self.tangent == 0.0 { 1.0 } else { ahead / self.tangent.abs() };
+        [ahead, self.tangent_aside.abs() * part]
     }
 }
 
@@ -73,16 +101,14 @@ const FAR_M: f32 = 160.0;
 impl Ground {
     pub(crate) fn new(options: &SceneOptions) -> Self {
         let trail = Trail { phase: -0.5 + 0.9 * super::noise::unit(super::noise::hash(options.seed ^ 0x7a11)) };
-        let tangent = libm::tanf(options.slope_deg.to_radians());
-        let start = (options.slope_start_m > -20.0).then_some(options.slope_start_m);
-        let slope = Slope { tangent, start };
+        let slope = Slope::new(options);
         let mut heights = vec![0.0; X_COUNT * Y_COUNT];
         let roll = Fractal { wave_m: 9.0, octaves: 2, gain: 0.45, seed: options.seed ^ 0x0151 };
         let bump = Fractal { wave_m: 1.3, octaves: 3, gain: 0.5, seed: options.seed ^ 0x0157 };
         let tuft = Fractal { wave_m: 0.38, octaves: 1, gain: 0.5, seed: options.seed ^ 0x0163 };
         for_each_chunk(&mut heights, Y_COUNT, |i, column| {
             let x = X_FIRST_M + i as f32 * STEP_M;
-            let (trail_y, base) = (trail.y(x), slope.z(x));
+            let trail_y = trail.y(x);
             for (j, height) in column.iter_mut().enumerate() {
                 let y = Y_FIRST_M + j as f32 * STEP_M;
                 let aside = (y - trail_y).abs();
@@ -93,22 +119,26 @@ impl Ground {
                     + small * (0.016 * bump.plane(x, y, 0.01).value + 0.008 * tuft.plane(x, y, 0.01).value)
                     + 0.03 * verge
                     - 0.03 * rut;
-                *height = base + options.roughness * z;
+                *height = slope.z(x, y) + options.roughness * z;
             }
         });
         let rises = rises(&heights);
-        let steep = tangent.abs() + 0.16 * options.roughness;
+        let [ahead, aside] = slope.steepest();
+        let steep = ahead + aside + 0.16 * options.roughness;
         let mut ceiling_m: f32 = 0.0;
         for (i, column) in heights.chunks(Y_COUNT).enumerate() {
-            let base = slope.z(X_FIRST_M + i as f32 * STEP_M);
-            ceiling_m = column.iter().fold(ceiling_m, |highest, z| highest.max(z - base));
+            let x = X_FIRST_M + i as f32 * STEP_M;
+            for (j, z) in column.iter().enumerate() {
+                ceiling_m = ceiling_m.max(z - slope.z(x, Y_FIRST_M + j as f32 * STEP_M));
+            }
         }
         Self { trail, slope, heights, rises, steep, ceiling_m }
     }
 
-    /// Height without the bumps, and its rise per metre forward.
-    pub(crate) fn base(&self, x: f32) -> (f32, f32) {
-        (self.slope.z(x), (self.slope.z(x + 0.5) - self.slope.z(x - 0.5)))
+    /// Rise per metre along x and along y of the ground without its bumps.
+    pub(crate) fn base_rise(&self, x: f32, y: f32) -> [f32; 2] {
+        let z = |dx: f32, dy: f32| self.slope.z(x + dx, y + dy);
+        [z(0.5, 0.0) - z(-0.5, 0.0), z(0.0, 0.5) - z(0.0, -0.5)]
     }
 
     pub(crate) fn height(&self, x: f32, y: f32) -> f32 {
@@ -146,12 +176,14 @@ impl Ground {
     pub(crate) fn meet(&self, origin: V3, direction: V3) -> Option<f32> {
         let mut t = 0.0;
         // First down to the height that no bump exceeds: one step where the ground is level.
-        let closing = self.slope.tangent.abs() * direction.x.abs() - direction.z;
+        let [ahead, aside] = self.slope.steepest();
+        let closing = ahead * direction.x.abs() + aside * direction.y.abs() - direction.z;
         if closing <= 1.0e-6 {
             return None;
         }
         for _ in 0..32 {
-            let gap = origin.z + direction.z * t - self.slope.z(origin.x + direction.x * t) - self.ceiling_m;
+            let base = self.slope.z(origin.x + direction.x * t, origin.y + direction.y * t);
+            let gap = origin.z + direction.z * t - base - self.ceiling_m;
             if gap < 0.01 || t > FAR_M {
                 break;
             }

@@ -6,6 +6,28 @@ use super::noise::Rng;
 use super::options::{Content, SceneOptions};
 use super::vector::{V3, v3};
 
+/// What stands on the ground of [`Content::Course`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CourseThing {
+    /// A wooden crate, 0.5 m long, wide and high.
+    Crate,
+    /// A wooden post, 1.2 m high and 0.16 m thick.
+    Post,
+}
+
+/// The things of [`Content::Course`] with the places of their middles: metres along the world's x axis, which is how far ahead
+/// of the first frame they are, and metres to the left of the trail (to the right in scenes with an even seed).
+///
+/// None hides another, and there is room between them to drive.
+pub const COURSE: [(CourseThing, f32, f32); 6] = [
+    (CourseThing::Post, 3.6, 1.1),
+    (CourseThing::Crate, 4.4, -1.3),
+    (CourseThing::Post, 5.8, -0.2),
+    (CourseThing::Crate, 6.6, 2.0),
+    (CourseThing::Post, 7.6, -3.0),
+    (CourseThing::Crate, 8.6, 0.7),
+];
+
 /// Places things on the ground.
 pub(crate) struct Planter<'a> {
     ground: &'a Ground,
@@ -19,16 +41,28 @@ pub(crate) fn furnish(options: &SceneOptions, ground: &Ground) -> Mesh {
     let mut planter = Planter::new(ground, options.seed);
     planter.grass(2200);
     planter.pebbles(90);
-    if options.content == Content::Rural {
-        planter.rural();
+    match options.content {
+        Content::Rural => planter.rural(),
+        Content::OpenGround => {}
+        Content::Course => COURSE.iter().for_each(|(thing, x, aside_m)| planter.stand(*thing, *x, *aside_m)),
     }
     planter.mesh
 }
 
+/// The ground `aside_m` to the left of the trail on the given [`side`].
+pub(crate) fn spot(ground: &Ground, side: f32, x: f32, aside_m: f32) -> V3 {
+    let y = ground.trail.y(x) + side * aside_m;
+    v3(x, y, ground.height(x, y))
+}
+
+/// -1 where the scene of a seed is the mirror image of the usual one, otherwise 1.
+pub(crate) const fn side(seed: u32) -> f32 {
+    if seed.is_multiple_of(2) { -1.0 } else { 1.0 }
+}
+
 impl<'a> Planter<'a> {
     pub(crate) fn new(ground: &'a Ground, seed: u32) -> Self {
-        let side = if seed.is_multiple_of(2) { -1.0 } else { 1.0 };
-        Self { ground, mesh: Mesh::default(), rng: Rng::new(seed), side }
+        Self { ground, mesh: Mesh::default(), rng: Rng::new(seed), side: side(seed) }
     }
 
     fn rural(&mut self) {
@@ -64,8 +98,7 @@ impl<'a> Planter<'a> {
 
     /// The ground `aside_m` to the left of the trail; to the right in a mirrored scene.
     fn spot(&self, x: f32, aside_m: f32) -> V3 {
-        let y = self.ground.trail.y(x) + self.side * aside_m;
-        v3(x, y, self.ground.height(x, y))
+        spot(self.ground, self.side, x, aside_m)
     }
 
     /// A rock that rises `height_m` above the ground.
@@ -74,6 +107,22 @@ impl<'a> Planter<'a> {
         let radii = v3(self.rng.range(0.6, 0.85), self.rng.range(0.65, 0.95), 0.82) * height_m;
         let centre = self.spot(x, aside_m) + V3::UP * (0.3 * height_m);
         self.mesh.stone(centre, radii, 26, &mut self.rng);
+    }
+
+    /// One of the things of the course, upright whatever the ground does, its foot deep enough for any slope.
+    fn stand(&mut self, thing: CourseThing, x: f32, aside_m: f32) {
+        let spot = self.spot(x, aside_m);
+        self.mesh.begin(V3::UP, true);
+        match thing {
+            CourseThing::Crate => {
+                let half = [v3(0.25, 0.0, 0.0), v3(0.0, 0.25, 0.0), V3::UP * 0.35];
+                self.mesh.slab(spot + V3::UP * 0.15, half, Material::Wood, 1.0);
+            }
+            CourseThing::Post => {
+                let (foot, top) = (spot - V3::UP * 0.1, spot + V3::UP * 1.2);
+                self.mesh.limb(foot, top, (0.08, 0.08), 0.02, Material::Wood, &mut self.rng);
+            }
+        }
     }
 
     fn pebbles(&mut self, count: usize) {

@@ -41,6 +41,7 @@ use fencepost_core::error::ConfigError;
 use fencepost_core::geometry::{Mount, StereoCalibration, VehicleFrame};
 
 pub use camera::SceneCamera;
+pub use layout::{COURSE, CourseThing};
 pub use options::{Content, Misalignment, SceneOptions};
 pub use score::{Score, score};
 pub use truth::{Truth, TruthCell, TruthCells};

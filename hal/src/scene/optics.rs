@@ -20,9 +20,15 @@ impl Pose {
         let y = ground.trail.y(x);
         let (s, c) = libm::sincosf(ground.trail.bearing(x));
         // The vehicle tilts with the hill, not with every bump.
-        let rise = ground.base(x).1 * c;
-        let forward = v3(c, s, rise).unit();
-        let left = v3(-s, c, 0.0);
+        let [rise, rise_aside] = ground.base_rise(x, y);
+        let forward = v3(c, s, rise * c + rise_aside * s).unit();
+        let level = v3(-s, c, 0.0);
+        let left = if rise == 0.0 && rise_aside == 0.0 {
+            level
+        } else {
+            let leaning = level + V3::UP * (rise_aside * c - rise * s);
+            (leaning - forward * leaning.dot(forward)).unit()
+        };
         Self { origin: v3(x, y, ground.height(x, y)), forward, left, up: forward.cross(left) }
     }
 

@@ -14,6 +14,8 @@ pub enum Content {
     Rural,
     /// Nothing higher than grass.
     OpenGround,
+    /// Crates and posts, nothing else higher than grass, at the places of [`COURSE`](super::COURSE).
+    Course,
 }
 
 /// How the right camera is turned against the left one, degrees about the camera's own axes.
@@ -50,8 +52,16 @@ pub struct SceneOptions {
     pub roll_deg: f32,
     /// Slope of the ground ahead, degrees; positive rises.
     pub slope_deg: f32,
-    /// Where the slope begins, metres ahead of the place of the first frame; from -20 down the whole ground slopes.
+    /// Tilt of the slope to the side, degrees; positive rises to the left. Where the ground does not slope ahead the whole of
+    /// it is tilted.
+    pub slope_aside_deg: f32,
+    /// Where the slope begins, metres ahead of the place of the first frame; from -20 down the whole ground slopes. A slope
+    /// that is tilted to the side begins there on the x axis, and along an oblique line.
     pub slope_start_m: f32,
+    /// Length of the slope, metres.
+    pub slope_length_m: f32,
+    /// Slope of the ground beyond it, degrees: negative behind a positive slope for a crest, the other way round for a dip.
+    pub slope_after_deg: f32,
     /// Height of the bumps of the ground over that of the default: 0 for a smooth ground.
     pub roughness: f32,
     /// Noise of the cameras, grey values (standard deviation); 0 for none.
@@ -85,7 +95,10 @@ impl Default for SceneOptions {
             pitch_down_deg: 10.0,
             roll_deg: 0.0,
             slope_deg: 0.0,
+            slope_aside_deg: 0.0,
             slope_start_m: 2.5,
+            slope_length_m: 34.0,
+            slope_after_deg: 0.0,
             roughness: 1.0,
             noise_sigma: 1.2,
             exposure_ratio: 1.08,
@@ -118,6 +131,9 @@ impl SceneOptions {
         ConfigError::check("scene.height", self.height as f32, 32.0, 4096.0)?;
         ConfigError::check("scene.mount_height_m", self.mount_height_m, 0.2, 4.0)?;
         ConfigError::check("scene.slope_deg", self.slope_deg, -30.0, 30.0)?;
+        ConfigError::check("scene.slope_aside_deg", self.slope_aside_deg, -30.0, 30.0)?;
+        ConfigError::check("scene.slope_length_m", self.slope_length_m, 1.0, 1.0e3)?;
+        ConfigError::check("scene.slope_after_deg", self.slope_after_deg, -30.0, 30.0)?;
         ConfigError::check("scene.slope_start_m", self.slope_start_m, -1.0e4, 1.0e4)?;
         ConfigError::check("scene.roughness", self.roughness, 0.0, 4.0)?;
         ConfigError::check("scene.noise_sigma", self.noise_sigma, 0.0, 50.0)?;

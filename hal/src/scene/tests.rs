@@ -243,7 +243,6 @@ fn the_slope_has_its_ten_degrees() {
 fn on_a_hill_the_vehicle_stands_along_it() {
     let level = bare(smooth(), |_, _| {}).truth(0);
     let hill = bare(SceneOptions { slope_deg: 10.0, slope_start_m: -100.0, ..smooth() }, |_, _| {}).truth(0);
-    // The trail bends: across the vehicle the hill tilts a little, which the middle of the picture does not show.
     let middle = 100 * 160 + 80;
     let (a, b) = (f32::from(level.disparity[middle]), f32::from(hill.disparity[middle]));
     assert!((a - b).abs() < 0.02 * a, "{a} on the level, {b} on the hill");
@@ -459,4 +458,45 @@ fn rays_meet_what_a_plain_search_finds() {
         met += u32::from(plain.is_finite());
     }
     assert!(met > 500, "{met} rays met something");
+}
+
+#[test]
+fn slopes_lie_where_the_options_say() {
+    let height = |options: &SceneOptions, x, y| Ground::new(options).height(x, y);
+    let flat = |slope_deg, slope_aside_deg, slope_start_m| SceneOptions {
+        slope_deg,
+        slope_aside_deg,
+        slope_start_m,
+        ..smooth()
+    };
+    let tan = |deg: f32| deg.to_radians().tan();
+    let near = |found: f32, expected: f32| assert!((found - expected).abs() < 2.0e-3, "{found} for {expected}");
+    // The whole ground: a plane through the origin, tilted both ways, or to the side alone.
+    near(height(&flat(15.0, -5.0, -100.0), 8.0, 3.0), 8.0 * tan(15.0) - 3.0 * tan(5.0));
+    near(height(&flat(0.0, 5.0, 2.5), 8.0, 3.0), 3.0 * tan(5.0));
+    // A slope ahead: level before an oblique line, a plane behind it (0.4 m later, for the bend).
+    let ahead = flat(-10.0, 5.0, 4.0);
+    near(height(&ahead, 3.0, 0.0), 0.0);
+    near(height(&ahead, 9.0, 0.0), -4.6 * tan(10.0));
+    near(height(&ahead, 9.0, 2.0), -4.6 * tan(10.0) + 2.0 * tan(5.0));
+    // A crest: 4 m up, then down.
+    let crest = SceneOptions { slope_length_m: 4.0, slope_after_deg: -10.0, ..flat(10.0, 0.0, 2.0) };
+    near(height(&crest, 6.0, 1.0), 3.6 * tan(10.0));
+    near(height(&crest, 12.0, 1.0), 4.0 * tan(10.0) - 5.6 * tan(10.0));
+}
+
+#[test]
+fn a_vehicle_on_a_slope_sees_a_plane_below_it() {
+    // Whatever the ground's tilt, the vehicle stands on it: the disparity is that of level ground.
+    let disparity = |slope_deg, slope_aside_deg| {
+        let options = SceneOptions { slope_deg, slope_aside_deg, slope_start_m: -100.0, ..smooth() };
+        bare(options, |_, _| {}).truth(0).disparity
+    };
+    let level = disparity(0.0, 0.0);
+    for (slope_deg, slope_aside_deg) in [(15.0, 0.0), (0.0, 5.0), (15.0, -5.0), (-15.0, 5.0)] {
+        let tilted = disparity(slope_deg, slope_aside_deg);
+        // A sixteenth of a pixel, within the nearest 8 m.
+        let differs = level.iter().zip(&tilted).filter(|(a, b)| **a > 512 && a.abs_diff(**b) > 16).count();
+        assert_eq!(differs, 0, "{slope_deg}° and {slope_aside_deg}°: pixels that differ");
+    }
 }

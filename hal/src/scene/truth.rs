@@ -4,6 +4,7 @@ use fencepost_core::map::MapGeometry;
 
 use super::Scene;
 use super::ground::Ground;
+use super::layout::{COURSE, side, spot};
 use super::mesh::Mesh;
 use super::noise::floor;
 use super::optics::{Eye, Pose};
@@ -99,6 +100,15 @@ impl Scene {
             occluded: seen.iter().map(|pixel| pixel.hidden).collect(),
             cells: self.judge(&seen, pose),
         }
+    }
+
+    /// The cell of the map in which the middle of a thing of [`COURSE`] stands in a frame, if it is on the map.
+    ///
+    /// The scene must be one with [`Content::Course`](super::Content::Course): others have nothing there.
+    pub fn course_cell(&self, thing: usize, frame: u32) -> Option<(i16, i16)> {
+        let (_, x, aside_m) = *COURSE.get(thing)?;
+        let v = self.pose(frame).to_vehicle(spot(&self.ground, side(self.options.seed), x, aside_m));
+        self.cell(v.x, v.y).map(|index| self.options.map.cell_at(index))
     }
 
     fn see(&self, left: &Eye, right: &Eye, pose: Pose, x: f32, y: f32) -> Seen {
