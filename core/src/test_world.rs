@@ -240,25 +240,16 @@ impl Stages {
         self.ground.run(&mut self.surfaces, &mut self.regions, picture)
     }
 
-    /// Where heights are measured from.
-    pub(crate) fn terrain(&self, ground: Option<GroundPlane>) -> Terrain {
-        match ground {
-            Some(plane) => self.ground.terrain(plane, self.surfaces.table()),
-            None => Terrain::flat(GroundPlane::of_mount(&self.frame)),
-        }
-    }
-
     /// All of them: the ground, the obstacles and how many were dropped.
     pub(crate) fn run<const OBSTACLES: usize>(
         &mut self,
         pixels: &[DisparityPixel],
     ) -> (Option<GroundPlane>, Vec<Obstacle>, u32) {
         let ground = self.ground(pixels);
-        let terrain = self.terrain(ground);
         let mut obstacles = heapless::Vec::<_, OBSTACLES, u16>::new();
         let picture = DisparityPicture::new(pixels, 320);
-        let Self { surfaces, regions, place, .. } = self;
-        let dropped = self.obstacles.run(surfaces, regions, picture, &terrain, place, &mut obstacles);
+        let Self { surfaces, regions, place, ground: finder, .. } = self;
+        let dropped = self.obstacles.run(surfaces, regions, picture, finder.terrain(), place, &mut obstacles);
         (ground, obstacles.to_vec(), dropped)
     }
 }

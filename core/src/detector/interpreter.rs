@@ -5,7 +5,7 @@ use crate::{
     disparity::DisparityPicture,
     error::ConfigError,
     geometry::DepthTable,
-    ground::{GroundFinder, GroundPlane, Terrain},
+    ground::{GroundFinder, GroundPlane},
     map::{Evidence, MapBuilder, View},
     methods::{
         COST_MAP_CLASSES, ConfidenceSettings, CostMap, DetectorKind, Detectors, DisparitySegments,
@@ -30,8 +30,9 @@ pub(super) struct Interpreter<
     pub(super) depth: DepthTable<DISPARITIES>,
     pub(super) surfaces: Surfaces<PIXELS, SURFACES>,
     regions: Regions<SURFACES>,
-    /// Of the detector and of the one that checks it: each holds a ground of its own from frame to frame.
-    ground: [GroundFinder; 2],
+    ground: GroundFinder,
+    /// The ground that the checking detector holds: each of the two has its own.
+    ground_of_check: Option<GroundPlane>,
     obstacles: ObstacleFinder,
     map: MapBuilder<CELLS>,
     cost_map: CostMap,
@@ -42,10 +43,10 @@ pub(super) struct Interpreter<
 }
 
 /// Which of the two detectors of a frame runs.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
-    Main = 0,
-    Check = 1,
+    Main,
+    Check,
 }
 
 impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SURFACES: usize, const CELLS: usize>
@@ -59,7 +60,8 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
             depth: DepthTable::new(),
             surfaces: Surfaces::new(),
             regions: Regions::new(),
-            ground: [GroundFinder::new(), GroundFinder::new()],
+            ground: GroundFinder::new(),
+            ground_of_check: None,
             obstacles: ObstacleFinder::new(),
             map: MapBuilder::new(),
             cost_map: CostMap::new(),
@@ -84,9 +86,8 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
         settings.confidence.check()?;
         self.surfaces.configure(&settings.surfaces, width, height)?;
         self.depth.configure(pair, settings.matching.min_disparity, settings.matching.disparities);
-        for finder in &mut self.ground {
-            finder.configure(&settings.ground, frame, height_known, pixels)?;
-        }
+        self.ground.configure(&settings.ground, frame, height_known, pixels)?;
+        self.ground_of_check = None;
         self.obstacles.configure(&settings.obstacles)?;
         self.map.configure(&settings.map, (settings.obstacles.min_height_m, settings.obstacles.clearance_m))?;
         self.cost_map.configure(&settings.cost_map, &settings.ground, pixels)?;
@@ -100,7 +101,8 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
 
     /// Forgets the ground of earlier frames.
     pub(super) fn forget(&mut self) {
-        self.ground.iter_mut().for_each(GroundFinder::forget);
+        self.ground.forget();
+        self.ground_of_check = None;
     }
 
     /// Finds ground, obstacles and cells in a disparity picture. `detection` is empty before.
@@ -158,16 +160,15 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
             }
         };
         let bends = matches!(kind, DetectorKind::SurfaceNormals | DetectorKind::PixelNormals);
-        let terrain = match ground {
-            Some(plane) if bends => self.ground[turn as usize].terrain(plane, self.surfaces.table()),
-            Some(plane) => Terrain::flat(plane),
-            None => Terrain::flat(GroundPlane::of_mount(&setup.frame)),
-        };
+        if !bends {
+            self.ground.flatten(ground.unwrap_or_else(|| GroundPlane::of_mount(&setup.frame)));
+        }
+        let terrain = self.ground.terrain();
 
         probe.enter(Stage::Obstacles);
         let found = &mut detection.obstacles;
         detection.statistics.obstacles_dropped =
-            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, &terrain, &setup.place, found);
+            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, terrain, &setup.place, found);
 
         probe.enter(Stage::Map);
         let view = view(setup, &self.depth);
@@ -175,15 +176,15 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
         match kind {
             DetectorKind::CostMap => {
                 let verdict = |counted: &Evidence, cell| self.cost_map.verdict(counted, cell, ground_seen);
-                self.map.finish(picture, &view, &terrain, ground_seen, map, verdict);
+                self.map.finish(picture, &view, terrain, ground_seen, map, verdict);
             }
             DetectorKind::DisparitySegments => {
                 self.map.begin();
                 self.segments.vote(&self.surfaces, picture, &view, &mut self.map);
-                self.map.finish(picture, &view, &terrain, ground_seen, map, |_, cell| cell);
+                self.map.finish(picture, &view, terrain, ground_seen, map, |_, cell| cell);
             }
             DetectorKind::SurfaceNormals | DetectorKind::PixelNormals | DetectorKind::GroundDeviation => {
-                self.map.run(&self.surfaces, picture, &view, &terrain, ground_seen, map);
+                self.map.run(&self.surfaces, picture, &view, terrain, ground_seen, map);
             }
         }
         detection.ground = ground.map(|plane| plane.moved(&setup.place));
@@ -198,7 +199,14 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
         probe: &mut impl Probe,
     ) -> Option<GroundPlane> {
         probe.enter(Stage::Ground);
-        self.ground[turn as usize].run(&mut self.surfaces, &mut self.regions, picture)
+        if turn == Turn::Check {
+            self.ground.exchange(&mut self.ground_of_check);
+        }
+        let found = self.ground.run(&mut self.surfaces, &mut self.regions, picture);
+        if turn == Turn::Check {
+            self.ground.exchange(&mut self.ground_of_check);
+        }
+        found
     }
 
     /// The ground by flat columns, and pixels by their height above it.

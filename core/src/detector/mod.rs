@@ -276,7 +276,7 @@ impl<
         let [left_row, right_row] = &mut self.rows;
         let (left_row, right_row) = (&mut left_row[..width], &mut right_row[..width]);
         // The first row that is not at the border of the picture is complete when this many have come.
-        let margin = usize::from(self.matcher.settings().window) / 2 + 1;
+        let [_, margin] = self.matcher.settings().margins();
         let needed = 2 * margin + 1;
         let mut matched = 0;
         for strip in 0..EXCHANGE_ROWS {

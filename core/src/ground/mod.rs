@@ -8,6 +8,8 @@ pub use plane::GroundPlane;
 pub use settings::GroundSettings;
 pub use terrain::Terrain;
 
+use terrain::Bend;
+
 use crate::{
     disparity::DisparityPicture,
     error::ConfigError,
@@ -42,6 +44,7 @@ pub struct GroundFinder {
     max_slope: f32,
     least_upright: f32,
     last: Option<GroundPlane>,
+    terrain: Terrain,
 }
 
 impl GroundFinder {
@@ -55,6 +58,7 @@ impl GroundFinder {
             max_slope: 0.0,
             least_upright: 0.0,
             last: None,
+            terrain: Terrain::new(),
         }
     }
 
@@ -86,7 +90,8 @@ impl GroundFinder {
         self.last = None;
     }
 
-    /// Finds the ground, or holds that of an earlier frame, and gives the surfaces on it their class.
+    /// Finds the ground, or holds that of an earlier frame, gives the surfaces on it their class and follows them with the
+    /// terrain. Without ground the terrain is the plane that the mount promises.
     pub fn run<const PIXELS: usize, const SURFACES: usize>(
         &mut self,
         surfaces: &mut Surfaces<PIXELS, SURFACES>,
@@ -103,15 +108,34 @@ impl GroundFinder {
         });
         // Without holding, no frame has a say in the next.
         self.last = plane.filter(|_| self.settings.hold_frames > 0);
-        if let Some(plane) = plane {
-            self.spread(&plane, surfaces, regions);
+        match plane {
+            Some(plane) => {
+                self.spread(&plane, surfaces, regions);
+                let bend = Bend {
+                    patch_m: self.settings.terrain_patch_m,
+                    share: self.settings.terrain_share,
+                    max_slope: self.max_slope,
+                };
+                self.terrain.fit(plane, surfaces.table(), &bend);
+            }
+            None => self.terrain.flatten(GroundPlane::of_mount(&frame)),
         }
         plane
     }
 
-    /// The ground as it bends, after [`Self::run`].
-    pub fn terrain(&self, plane: GroundPlane, table: &[Surface]) -> Terrain {
-        Terrain::of(plane, table, self.settings.corridor_m)
+    /// Exchanges the ground of the frame before for that of another detector, which looks at the same pictures in turn.
+    pub(crate) const fn exchange(&mut self, other: &mut Option<GroundPlane>) {
+        core::mem::swap(&mut self.last, other);
+    }
+
+    /// Has heights measured from `plane`, without bends, after a detector that finds the ground in its own way.
+    pub(crate) fn flatten(&mut self, plane: GroundPlane) {
+        self.terrain.flatten(plane);
+    }
+
+    /// Where heights are measured from, after [`Self::run`].
+    pub const fn terrain(&self) -> &Terrain {
+        &self.terrain
     }
 
     /// Gives the class of ground to the near-horizontal surfaces on the plane, and to those that hang together with them:

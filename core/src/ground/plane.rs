@@ -28,6 +28,18 @@ pub struct GroundPlane {
 }
 
 impl GroundPlane {
+    /// All zero, for a stage that is not configured.
+    pub(super) const UNSET: Self = Self {
+        normal: [0.0; 3],
+        offset_m: 0.0,
+        camera_height_m: 0.0,
+        pitch_down_rad: 0.0,
+        roll_rad: 0.0,
+        support: 0,
+        rms_m: 0.0,
+        age_frames: 0,
+    };
+
     /// The plane through a set of points; `None` where they do not define one.
     pub fn through(points: &Scatter, frame: &VehicleFrame) -> Option<Self> {
         let (normal, variance) = points.plane()?;

@@ -22,6 +22,10 @@ pub struct GroundSettings {
     pub max_range_m: f32,
     /// Surfaces this far to the side count half, metres: the plane is that of the ground ahead, not that of the verges.
     pub corridor_m: f32,
+    /// Edge of the patches that the ground is followed with, metres: bends within a patch are not seen.
+    pub terrain_patch_m: f32,
+    /// How much of what is known of the ground in one patch counts in the next: with 0 each patch stands on its own.
+    pub terrain_share: f32,
     /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
     pub min_support_permille: f32,
     /// Frames for which the last plane is held when a frame has none; with 0 each frame stands on its own.
@@ -38,6 +42,8 @@ impl GroundSettings {
         surface_tolerance_per_m: 0.0,
         max_range_m: 0.0,
         corridor_m: 0.0,
+        terrain_patch_m: 0.0,
+        terrain_share: 0.0,
         min_support_permille: 0.0,
         hold_frames: 0,
     };
@@ -54,6 +60,8 @@ impl GroundSettings {
         ConfigError::check("ground.surface_tolerance_per_m", self.surface_tolerance_per_m, 0.0, 0.5)?;
         ConfigError::check("ground.max_range_m", self.max_range_m, 1.0, 1000.0)?;
         ConfigError::check("ground.corridor_m", self.corridor_m, 0.1, 1000.0)?;
+        ConfigError::check("ground.terrain_patch_m", self.terrain_patch_m, 0.05, 100.0)?;
+        ConfigError::check("ground.terrain_share", self.terrain_share, 0.0, 0.9)?;
         ConfigError::check("ground.min_support_permille", self.min_support_permille, 0.0, 1000.0)?;
         ConfigError::check("ground.hold_frames", f32::from(self.hold_frames), 0.0, 1000.0)
     }
@@ -69,6 +77,8 @@ impl Default for GroundSettings {
             surface_tolerance_per_m: 0.01,
             max_range_m: 25.0,
             corridor_m: 1.0,
+            terrain_patch_m: 1.0,
+            terrain_share: 0.15,
             min_support_permille: 2.0,
             hold_frames: 10,
         }

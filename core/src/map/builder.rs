@@ -134,8 +134,8 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
 
     /// What a pixel says of the cell at `[x, y]` of the vehicle frame, metres.
     pub(crate) fn vote(&mut self, [x, y]: [f32; 2], vote: Vote) {
-        let Some(index) = self.settings.geometry.index_at(x, y) else { return };
-        let evidence = &mut self.evidence[index];
+        let place = self.settings.geometry.index_at(x, y);
+        let Some(evidence) = place.and_then(|place| self.evidence.get_mut(place)) else { return };
         match vote {
             Vote::Ground => evidence.ground = evidence.ground.saturating_add(1),
             Vote::Obstacle { height_m } => {
@@ -200,8 +200,8 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             if role != Role::Nothing {
                 let z = view.depth.distance_m(pixel.steps());
                 let x = view.rays.origin_m[0] + z * direction[0];
-                let height = camera_height + z * climb - ground.lift_m(x);
                 let y = view.rays.origin_m[1] + z * direction[1];
+                let height = camera_height + z * climb - ground.lift_m(x, y);
                 let [i, j] = view.place.to_vehicle([x, y]).map(|metres| floor(metres * per_cell));
                 if let Some(evidence) = self.settings.geometry.index(i, j).map(|i| &mut self.evidence[i]) {
                     let too_high = height > self.settings.free_max_height_m;
@@ -317,7 +317,7 @@ impl Sight {
     ) -> Option<Self> {
         let plane = ground.plane();
         let [nx, ny, nz] = plane.normal;
-        let level = plane.offset_m + ground.lift_m(x);
+        let level = plane.offset_m + ground.lift_m(x, y);
         let z = if nz.abs() > 1.0e-3 { (level - nx * x - ny * y) / nz } else { 0.0 };
         let origin = view.rays.origin_m;
         let [right, down, distance_m] = view.frame.to_camera([x - origin[0], y - origin[1], z - origin[2]]);

@@ -76,7 +76,7 @@ impl Default for MapSettings {
             geometry: MapGeometry::default(),
             obstacle_cover: 0.05,
             obstacle_min_pixels: 8,
-            free_cover: 0.1,
+            free_cover: 0.03,
             free_min_pixels: 4,
             free_max_height_m: 0.2,
             mixed_rms_m: 0.03,

@@ -1,8 +1,8 @@
 //! Sums over the height of the window, for each column and disparity.
 
-use super::rows::FilteredRow;
+use super::{MatchCost, rows::FilteredRow};
 
-/// For each column of the left picture, the sums over the rows under the window: absolute differences for each disparity
+/// For each column of the left picture, the sums over the rows under the window: differences for each disparity
 /// (largest disparity first, so that the right pixels lie in the order of memory), texture, saturated pixels.
 pub(super) struct Columns<const WIDTH: usize, const DISPARITIES: usize> {
     costs: [[u16; DISPARITIES]; WIDTH],
@@ -41,6 +41,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Columns<WIDTH, DISPARITIES> {
     /// `width x disparities` steps.
     pub(super) fn slide(
         &mut self,
+        cost: MatchCost,
         enter: FilteredRow<'_>,
         leave: Option<FilteredRow<'_>>,
         disparities: usize,
@@ -48,16 +49,41 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Columns<WIDTH, DISPARITIES> {
     ) {
         slide_sums(&mut self.texture, enter.texture, leave.map(|row| row.texture));
         slide_sums(&mut self.saturated, enter.saturated, leave.map(|row| row.saturated));
-        for (x, (column, &left)) in self.costs.iter_mut().zip(enter.left).enumerate() {
+        match cost {
+            MatchCost::Census => {
+                let difference = |left: u8, right: u8| (left ^ right).count_ones() as u16;
+                let (enter, leave) = (enter.codes(), leave.map(FilteredRow::codes));
+                self.slide_costs(enter, leave, disparities, min_disparity, difference);
+            }
+            MatchCost::AbsoluteDifferences => {
+                let difference = |left: u8, right: u8| u16::from(left.abs_diff(right));
+                let (enter, leave) = (enter.grey(), leave.map(FilteredRow::grey));
+                self.slide_costs(enter, leave, disparities, min_disparity, difference);
+            }
+        }
+    }
+
+    fn slide_costs(
+        &mut self,
+        (enter_left, enter_right): (&[u8], &[u8]),
+        leave: Option<(&[u8], &[u8])>,
+        disparities: usize,
+        min_disparity: usize,
+        difference: impl Fn(u8, u8) -> u16 + Copy,
+    ) {
+        for (x, (column, &left)) in self.costs.iter_mut().zip(enter_left).enumerate() {
             // Place e holds disparity `min + disparities - 1 - e`, whose right pixel is `x + 1 - min - disparities + e`.
             let Some(last) = x.checked_sub(min_disparity) else { continue };
             let first = (last + 1).saturating_sub(disparities);
             let skipped = disparities - (last + 1 - first);
             let column = &mut column[skipped..disparities];
-            let right = &enter.right[first..=last];
+            let right = &enter_right[first..=last];
             match leave {
-                Some(leave) => slide_column(column, left, right, leave.left[x], &leave.right[first..=last]),
-                None => enter_column(column, left, right),
+                Some((leave_left, leave_right)) => {
+                    let out = (leave_left[x], &leave_right[first..=last]);
+                    slide_column(column, (left, right), out, difference);
+                }
+                None => enter_column(column, left, right, difference),
             }
         }
     }
@@ -72,16 +98,19 @@ fn slide_sums(sums: &mut [u16], enter: &[u8], leave: Option<&[u8]>) {
     }
 }
 
-fn enter_column(column: &mut [u16], left: u8, right: &[u8]) {
+fn enter_column(column: &mut [u16], left: u8, right: &[u8], difference: impl Fn(u8, u8) -> u16) {
     for (sum, &right) in column.iter_mut().zip(right) {
-        *sum = sum.wrapping_add(u16::from(left.abs_diff(right)));
+        *sum = sum.wrapping_add(difference(left, right));
     }
 }
 
-fn slide_column(column: &mut [u16], left: u8, right: &[u8], left_out: u8, right_out: &[u8]) {
+fn slide_column(
+    column: &mut [u16],
+    (left, right): (u8, &[u8]),
+    (left_out, right_out): (u8, &[u8]),
+    difference: impl Fn(u8, u8) -> u16,
+) {
     for ((sum, &right), &right_out) in column.iter_mut().zip(right).zip(right_out) {
-        let enter = u16::from(left.abs_diff(right));
-        let leave = u16::from(left_out.abs_diff(right_out));
-        *sum = sum.wrapping_add(enter).wrapping_sub(leave);
+        *sum = sum.wrapping_add(difference(left, right)).wrapping_sub(difference(left_out, right_out));
     }
 }

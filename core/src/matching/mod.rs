@@ -1,9 +1,10 @@
-//! Stereo matching: sums of absolute differences over a window, with every check that comes from the same costs.
+//! Stereo matching: differences summed over a window, with every check that comes from the same costs.
 //!
 //! Rows of the rectified pair go in from the top, rows of the disparity picture come out, half a window later. Nothing of
 //! the pictures is kept but the rows under the window.
 
 mod best;
+mod census;
 mod columns;
 mod prefilter;
 mod rows;
@@ -12,7 +13,7 @@ mod strip;
 
 pub(crate) use best::refine;
 pub use rows::ValidSpan;
-pub use settings::{MatchSettings, Prefilter};
+pub use settings::{MatchCost, MatchSettings, Prefilter};
 pub(crate) use strip::Strip;
 
 use crate::{
@@ -25,11 +26,12 @@ use rows::Rows;
 
 /// The matcher for pictures up to `WIDTH` wide and up to `DISPARITIES` disparities.
 ///
-/// Source: the paper, section 2.2 (sum of absolute differences, 7 x 7) and 4.2 (validation). The four checks come from one
+/// Source: the paper, section 2.2 (windows compared along the row) and 4.2 (validation). The four checks come from one
 /// pass over the costs of a row.
 ///
 /// # Bound
-/// Each output row takes `width x disparities` steps for the costs, the same for the selection, and `width` for the rest.
+/// Each output row takes `width x disparities` steps for the costs, the same for the selection with each of the two windows, and
+/// `width` for the rest.
 pub struct Matcher<const WIDTH: usize, const DISPARITIES: usize> {
     settings: MatchSettings,
     width: usize,
@@ -37,6 +39,8 @@ pub struct Matcher<const WIDTH: usize, const DISPARITIES: usize> {
     rows: Rows<WIDTH>,
     columns: Columns<WIDTH, DISPARITIES>,
     right: RightBest<WIDTH>,
+    /// Pixels of the row that the narrow window could not tell for want of texture.
+    weak: [bool; WIDTH],
     /// Sums under the window at the current pixel, largest disparity first.
     costs: [u16; DISPARITIES],
 }
@@ -58,6 +62,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             rows: Rows::new(),
             columns: Columns::new(),
             right: RightBest::new(),
+            weak: [false; WIDTH],
             costs: [0; DISPARITIES],
         }
     }
@@ -91,7 +96,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
 
     /// Starts a new picture.
     pub fn begin(&mut self) {
-        self.rows.begin();
+        self.rows.begin(self.settings.reach());
         self.columns.begin();
     }
 
@@ -102,19 +107,20 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if left.len() != self.width || right.len() != self.width || self.rows.pushed() >= self.height {
             return;
         }
-        self.rows.push(left, right, left_span, right_span, self.settings.prefilter);
+        self.rows.push(left, right, left_span, right_span, &self.settings);
         self.absorb();
     }
 
     /// Adds the newest filtered row, if there is one, to the column sums and takes the one that leaves the window out.
     fn absorb(&mut self) {
-        let window = usize::from(self.settings.window);
+        let window = usize::from(self.settings.window_height);
+        let first = self.rows.first_filtered();
         let Some(newest) = self.rows.newest_filtered() else { return };
         let enter = self.rows.filtered(newest, self.width);
-        // Row 0 was never filtered, so it never entered.
-        let leave = newest.checked_sub(window).filter(|&y| y > 0).map(|y| self.rows.filtered(y, self.width));
+        // Rows above the first filtered one never entered.
+        let leave = newest.checked_sub(window).filter(|&y| y >= first).map(|y| self.rows.filtered(y, self.width));
         let disparities = usize::from(self.settings.disparities);
-        self.columns.slide(enter, leave, disparities, usize::from(self.settings.min_disparity));
+        self.columns.slide(self.settings.cost, enter, leave, disparities, usize::from(self.settings.min_disparity));
     }
 
     /// Writes disparity row `next` to `out` if all that it needs has come; says whether it did. Rows are to be taken in order,
@@ -123,8 +129,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if next >= self.height || out.len() != self.width {
             return false;
         }
-        // A row of the window needs the row below it for the vertical part of the filter.
-        let margin = usize::from(self.settings.window) / 2 + 1;
+        // A row of the window needs rows around it for what is compared.
+        let [_, margin] = self.settings.margins();
         let border = next < margin || next + margin >= self.height;
         let available = if border { next < self.rows.pushed() } else { next + margin < self.rows.pushed() };
         if !available {
@@ -138,22 +144,41 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         true
     }
 
-    /// Matches the row under the middle of the window.
+    /// Matches the row under the middle of the window: with the narrow window, and with the wide one where the texture is weak and
+    /// the narrow one could not tell one place from another.
     fn match_row(&mut self, y: usize, out: &mut [DisparityPixel]) {
-        let radius = usize::from(self.settings.window) / 2;
-        let window = 2 * radius + 1;
-        let disparities = usize::from(self.settings.disparities);
-        let min_disparity = usize::from(self.settings.min_disparity);
-        let (left, right) = self.rows.spans(y, radius + 1);
-        // Columns that the window and its filter may touch, and their middle pixels.
-        let first = usize::from(left.start) + radius + 1;
-        let end = usize::from(left.end).min(self.width).saturating_sub(radius + 1);
         out.fill(DisparityPixel::none(Reason::OutsideValidArea));
+        self.weak[..self.width].fill(false);
+        self.pass(y, Window::Narrow, out);
+        if self.settings.wide_window_width > 0 && self.weak[..self.width].contains(&true) {
+            self.pass(y, Window::Wide, out);
+        }
+    }
+
+    /// Goes along a row with one of the windows.
+    fn pass(&mut self, y: usize, window: Window, out: &mut [DisparityPixel]) {
+        let settings = self.settings;
+        let width = match window {
+            Window::Narrow => settings.window_width,
+            Window::Wide => settings.wide_window_width,
+        };
+        let uniqueness_percent = match window {
+            Window::Narrow => settings.uniqueness_percent,
+            Window::Wide => settings.wide_uniqueness_percent,
+        };
+        let radius = usize::from(width) / 2;
+        let margin = radius + settings.reach();
+        let disparities = usize::from(settings.disparities);
+        let min_disparity = usize::from(settings.min_disparity);
+        // Columns that the window and what is compared may touch, and their middle pixels.
+        let (left, right) = self.rows.spans(y, usize::from(settings.window_height) / 2 + 1);
+        let first = usize::from(left.start) + margin;
+        let end = usize::from(left.end).min(self.width).saturating_sub(margin);
         if first >= end {
             return;
         }
-        let right_first = usize::from(right.start) + radius + 1;
-        let right_end = usize::from(right.end).min(self.width).saturating_sub(radius + 1);
+        let right_first = usize::from(right.start) + margin;
+        let right_end = usize::from(right.end).min(self.width).saturating_sub(margin);
         self.right.begin(self.width);
         let costs = &mut self.costs[..disparities];
         costs.fill(0);
@@ -163,9 +188,10 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             texture += u32::from(self.columns.texture(x));
             saturated += u32::from(self.columns.saturated(x));
         }
-        let area = (window * window) as u32;
-        let min_texture = (u32::from(self.settings.texture) * area) >> 4;
-        let max_saturated = area * u32::from(self.settings.saturated_percent) / 100;
+        let area = u32::from(width) * u32::from(settings.window_height);
+        let min_texture = (u32::from(settings.texture) * area) >> 4;
+        let weak_texture = (u32::from(settings.weak_texture) * area) >> 4;
+        let max_saturated = area * u32::from(settings.saturated_percent) / 100;
         for x in first..end {
             let enter = x + radius;
             let leave = x.wrapping_sub(radius + 1);
@@ -180,7 +206,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             saturated += u32::from(self.columns.saturated(enter));
 
             // Place e in the table is disparity min + (disparities - 1 - e); its right pixel is x - disparity.
-            let Some(out) = out.get_mut(x) else { break };
+            let (Some(out), Some(weak)) = (out.get_mut(x), self.weak.get_mut(x)) else { break };
             let Some(reach) = x.checked_sub(right_first) else { continue };
             let largest = (min_disparity + disparities - 1).min(reach);
             let smallest = min_disparity.max((x + 1).saturating_sub(right_end));
@@ -190,23 +216,33 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             let place = |disparity: usize| min_disparity + disparities - 1 - disparity;
             let candidates = Candidates { first: place(largest), end: place(smallest) + 1 };
             self.right.offer(&costs[candidates.first..candidates.end], x - largest, largest as u16);
+            if window == Window::Wide && !*weak {
+                continue;
+            }
             *out = if saturated > max_saturated {
                 DisparityPixel::none(Reason::Saturated)
             } else if texture < min_texture {
                 DisparityPixel::none(Reason::LowTexture)
             } else {
-                choose(costs, candidates, min_disparity + disparities - 1, self.settings.uniqueness_percent)
+                choose(costs, candidates, min_disparity + disparities - 1, uniqueness_percent)
+            };
+            let told_apart = !matches!(out.get(), Err(Reason::LowTexture | Reason::NotUnique));
+            *weak = match window {
+                Window::Narrow => texture < weak_texture && !told_apart,
+                Window::Wide => true,
             };
         }
-        if self.settings.back_check {
-            self.back_check(&mut out[first..end], first, i32::from(self.settings.back_check_px));
+        if settings.back_check {
+            self.back_check(&mut out[first..end], first, window);
         }
     }
 
-    /// Takes out pixels whose right partner matches another left pixel better.
-    fn back_check(&self, out: &mut [DisparityPixel], first: usize, tolerance: i32) {
-        for (i, pixel) in out.iter_mut().enumerate() {
-            if !pixel.has_value() {
+    /// Takes out pixels that were matched with `window` and whose right partner matches another left pixel better.
+    fn back_check(&self, out: &mut [DisparityPixel], first: usize, window: Window) {
+        let tolerance = i32::from(self.settings.back_check_px);
+        let weak = self.weak.get(first..).unwrap_or_default();
+        for (i, (pixel, &weak)) in out.iter_mut().zip(weak).enumerate() {
+            if !pixel.has_value() || weak != (window == Window::Wide) {
                 continue;
             }
             let disparity = usize::from((pixel.steps() + 8) >> 4);
@@ -217,6 +253,13 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             }
         }
     }
+}
+
+/// Which of the two windows a row is matched with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Window {
+    Narrow,
+    Wide,
 }
 
 impl<const WIDTH: usize, const DISPARITIES: usize> Default for Matcher<WIDTH, DISPARITIES> {
@@ -245,7 +288,7 @@ fn choose(costs: &[u16], candidates: Candidates, top: usize, uniqueness_percent:
     DisparityPixel::from_steps(steps.max(0) as u16)
 }
 
-/// `costs += enter`, wrapping: sums of up to 21 x 21 differences of up to 127 fit 16 bits.
+/// `costs += enter`, wrapping: the settings see to it that sums fit 16 bits.
 fn add(costs: &mut [u16], enter: &[u16]) {
     for (cost, &enter) in costs.iter_mut().zip(enter) {
         *cost = cost.wrapping_add(enter);

@@ -1,12 +1,12 @@
 //! The rows under the window, as they come in.
 
-use super::{MatchSettings, Prefilter, prefilter};
+use super::{MatchCost, MatchSettings, census, prefilter};
 
 /// Filtered rows that are kept: the window, and the one that leaves it.
 pub(super) const KEPT: usize = MatchSettings::MAX_WINDOW as usize + 1;
 
-/// Grey rows that are kept for the filter.
-const GREY: usize = 3;
+/// Grey rows that are kept for the filters.
+const GREY: usize = census::ROWS;
 
 /// Grey values that the camera cannot be trusted to have measured.
 pub(super) const SATURATED: [u8; 2] = [0, 255];
@@ -46,6 +46,21 @@ pub(super) struct FilteredRow<'a> {
     pub(super) texture: &'a [u8],
     /// 1 where the left grey value is saturated.
     pub(super) saturated: &'a [u8],
+    /// Census codes; all 0 where absolute differences are compared.
+    pub(super) left_codes: &'a [u8],
+    pub(super) right_codes: &'a [u8],
+}
+
+impl<'a> FilteredRow<'a> {
+    /// What absolute differences are taken of, left and right.
+    pub(super) const fn grey(self) -> (&'a [u8], &'a [u8]) {
+        (self.left, self.right)
+    }
+
+    /// What Hamming distances are taken of, left and right.
+    pub(super) const fn codes(self) -> (&'a [u8], &'a [u8]) {
+        (self.left_codes, self.right_codes)
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -54,16 +69,20 @@ struct Kept<const WIDTH: usize> {
     right: [u8; WIDTH],
     texture: [u8; WIDTH],
     saturated: [u8; WIDTH],
+    left_codes: [u8; WIDTH],
+    right_codes: [u8; WIDTH],
     spans: (ValidSpan, ValidSpan),
 }
 
-/// Rings of grey and filtered rows. A filtered row is complete when the grey row below it has come.
+/// Rings of grey and filtered rows. A filtered row is complete when the grey rows below that it needs have come.
 pub(super) struct Rows<const WIDTH: usize> {
     grey_left: [[u8; WIDTH]; GREY],
     grey_right: [[u8; WIDTH]; GREY],
     grey_spans: [(ValidSpan, ValidSpan); GREY],
     kept: [Kept<WIDTH>; KEPT],
     pushed: usize,
+    /// Rows above and below that a filtered row is made from.
+    reach: usize,
 }
 
 impl<const WIDTH: usize> Rows<WIDTH> {
@@ -77,14 +96,19 @@ impl<const WIDTH: usize> Rows<WIDTH> {
                 right: [0; WIDTH],
                 texture: [0; WIDTH],
                 saturated: [0; WIDTH],
+                left_codes: [0; WIDTH],
+                right_codes: [0; WIDTH],
                 spans: (ValidSpan::EMPTY, ValidSpan::EMPTY),
             }; KEPT],
             pushed: 0,
+            reach: 0,
         }
     }
 
-    pub(super) fn begin(&mut self) {
+    /// Starts a picture whose filtered rows are made from `reach` rows above and below.
+    pub(super) fn begin(&mut self, reach: usize) {
         self.pushed = 0;
+        self.reach = reach.min(census::REACH);
     }
 
     /// Number of grey rows that have come.
@@ -92,9 +116,14 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         self.pushed
     }
 
-    /// Number of the newest filtered row. Row 0 has no row above it and is never filtered.
+    /// Number of the first row that is filtered: those above it have too few rows above them.
+    pub(super) const fn first_filtered(&self) -> usize {
+        self.reach
+    }
+
+    /// Number of the newest filtered row.
     pub(super) fn newest_filtered(&self) -> Option<usize> {
-        self.pushed.checked_sub(2).filter(|&y| y > 0)
+        self.pushed.checked_sub(self.reach + 1).filter(|&y| y >= self.reach)
     }
 
     pub(super) fn push(
@@ -103,7 +132,7 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         right: &[u8],
         left_span: ValidSpan,
         right_span: ValidSpan,
-        kind: Prefilter,
+        settings: &MatchSettings,
     ) {
         let slot = self.pushed % GREY;
         let width = left.len();
@@ -112,33 +141,28 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         self.grey_spans[slot] = (left_span, right_span);
         self.pushed += 1;
         let Some(y) = self.newest_filtered() else { return };
-        let kept = &mut self.kept[y % KEPT];
-        let [above, middle, below] = [(y - 1) % GREY, y % GREY, (y + 1) % GREY];
-        let grey = &self.grey_left;
-        prefilter::filter(
-            kind,
-            &grey[above][..width],
-            &grey[middle][..width],
-            &grey[below][..width],
-            &mut kept.left[..width],
-        );
-        for (out, grey) in kept.saturated[..width].iter_mut().zip(&grey[middle][..width]) {
+        let Self { grey_left, grey_right, grey_spans, kept, reach, .. } = self;
+        let kept = &mut kept[y % KEPT];
+        for (grey, filtered, codes) in [
+            (&*grey_left, &mut kept.left[..width], &mut kept.left_codes[..width]),
+            (&*grey_right, &mut kept.right[..width], &mut kept.right_codes[..width]),
+        ] {
+            // The ring holds rows y - 3 to y + 3; those that a filter does not reach may be missing.
+            let rows: [&[u8]; GREY] = core::array::from_fn(|i| &grey[(y + GREY + i - census::REACH) % GREY][..width]);
+            let [_, _, above, middle, below, _, _] = rows;
+            prefilter::filter(settings.prefilter, above, middle, below, filtered);
+            if settings.cost == MatchCost::Census {
+                census::codes(rows, codes);
+            }
+        }
+        for (out, grey) in kept.saturated[..width].iter_mut().zip(&grey_left[y % GREY][..width]) {
             *out = u8::from(SATURATED.contains(grey));
         }
-        let grey = &self.grey_right;
-        prefilter::filter(
-            kind,
-            &grey[above][..width],
-            &grey[middle][..width],
-            &grey[below][..width],
-            &mut kept.right[..width],
-        );
         let before = core::iter::once(&kept.left[0]).chain(&kept.left[..width]);
         for ((out, &filtered), &before) in kept.texture[..width].iter_mut().zip(&kept.left[..width]).zip(before) {
-            *out = prefilter::response(kind, filtered, before);
+            *out = prefilter::response(settings.prefilter, filtered, before);
         }
-        let [a, m, b] = [self.grey_spans[above], self.grey_spans[middle], self.grey_spans[below]];
-        kept.spans = (a.0.intersect(m.0).intersect(b.0), a.1.intersect(m.1).intersect(b.1));
+        kept.spans = (y - *reach..=y + *reach).map(|y| grey_spans[y % GREY]).fold(EVERYTHING, both);
     }
 
     /// Filtered row `y`, which must be among the last [`KEPT`].
@@ -149,16 +173,22 @@ impl<const WIDTH: usize> Rows<WIDTH> {
             right: &kept.right[..width],
             texture: &kept.texture[..width],
             saturated: &kept.saturated[..width],
+            left_codes: &kept.left_codes[..width],
+            right_codes: &kept.right_codes[..width],
         }
     }
 
     /// Columns that are valid in all filtered rows within `radius - 1` of row `y`, left and right.
     pub(super) fn spans(&self, y: usize, radius: usize) -> (ValidSpan, ValidSpan) {
         let first = (y + 1).saturating_sub(radius);
-        (first..y + radius)
-            .map(|y| self.kept[y % KEPT].spans)
-            .fold((ValidSpan { start: 0, end: u16::MAX }, ValidSpan { start: 0, end: u16::MAX }), |all, row| {
-                (all.0.intersect(row.0), all.1.intersect(row.1))
-            })
+        (first..y + radius).map(|y| self.kept[y % KEPT].spans).fold(EVERYTHING, both)
     }
+}
+
+/// Spans of the left and right row that take nothing away.
+const EVERYTHING: (ValidSpan, ValidSpan) =
+    (ValidSpan { start: 0, end: u16::MAX }, ValidSpan { start: 0, end: u16::MAX });
+
+fn both(all: (ValidSpan, ValidSpan), row: (ValidSpan, ValidSpan)) -> (ValidSpan, ValidSpan) {
+    (all.0.intersect(row.0), all.1.intersect(row.1))
 }

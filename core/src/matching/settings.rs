@@ -1,5 +1,6 @@
 //! Settings of the matcher.
 
+use super::census;
 use crate::error::{ConfigError, ConfigProblem};
 
 /// What is compared between the two pictures.
@@ -13,6 +14,18 @@ pub enum Prefilter {
     Grey,
 }
 
+/// How two windows are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum MatchCost {
+    /// Hamming distance of census codes: eight bits for each pixel say which of eight pixels around it are darker. What a
+    /// pixel says does not grow with its contrast, so that weak texture, such as tarmac, still finds its match.
+    #[default]
+    Census,
+    /// The sum of absolute differences of the prefiltered pictures, as in the paper.
+    AbsoluteDifferences,
+}
+
 /// Settings of the matcher.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
@@ -21,9 +34,22 @@ pub struct MatchSettings {
     pub disparities: u16,
     /// Smallest disparity searched, px.
     pub min_disparity: u16,
-    /// Edge of the matching window, px; odd, 5 to 21. The paper, section 2.2: 7.
-    pub window: u16,
-    /// What is compared.
+    /// How two windows are compared.
+    pub cost: MatchCost,
+    /// Width of the matching window, px; odd, 5 to 21. The paper, section 2.2: 7. Wider than high, because the disparity of the
+    /// ground changes from row to row and not along a row: a wide window sees more of it at one disparity, a high one does not.
+    pub window_width: u16,
+    /// Height of the matching window, px; odd, 5 to 21. The paper, section 2.2: 7.
+    pub window_height: u16,
+    /// Width of a second window, px; odd, up to 63, and not less than the first; 0 for none. It is asked where the first cannot
+    /// tell one place from another because the texture is weak, as on tarmac: there are few edges that it could smear.
+    pub wide_window_width: u16,
+    /// Below this mean absolute prefilter response under the first window the texture is weak, 1/16 grey values. Texture above it
+    /// that is not unique is repetitive, and a wider window does not help.
+    pub weak_texture: u16,
+    /// As `uniqueness_percent`, for the second window: its sums are larger and their noise relative to them smaller.
+    pub wide_uniqueness_percent: u16,
+    /// What the texture is measured on, and what absolute differences are taken of.
     pub prefilter: Prefilter,
     /// Least mean absolute prefilter response (for plain grey: horizontal difference) under the window, in 1/16 grey
     /// values; 0 turns the texture check off. Mild, since it costs ground points (the paper, section 4.2).
@@ -50,10 +76,15 @@ impl MatchSettings {
     pub const DEFAULT: Self = Self {
         disparities: 64,
         min_disparity: 0,
-        window: 7,
+        cost: MatchCost::Census,
+        window_width: 9,
+        window_height: 7,
+        wide_window_width: 31,
+        weak_texture: 224,
+        wide_uniqueness_percent: 4,
         prefilter: Prefilter::HorizontalSobel,
         texture: 16,
-        uniqueness_percent: 8,
+        uniqueness_percent: 6,
         back_check: true,
         back_check_px: 1,
         saturated_percent: 60,
@@ -62,7 +93,12 @@ impl MatchSettings {
     pub(super) const UNSET: Self = Self {
         disparities: 0,
         min_disparity: 0,
-        window: 0,
+        cost: MatchCost::Census,
+        window_width: 0,
+        window_height: 0,
+        wide_window_width: 0,
+        weak_texture: 0,
+        wide_uniqueness_percent: 0,
         prefilter: Prefilter::HorizontalSobel,
         texture: 0,
         uniqueness_percent: 0,
@@ -75,6 +111,22 @@ impl MatchSettings {
     pub const MIN_WINDOW: u16 = 5;
     /// Largest window: its sums still fit 16 bits.
     pub const MAX_WINDOW: u16 = 21;
+    /// Largest width of the second window.
+    pub const MAX_WIDE_WINDOW: u16 = 63;
+
+    /// Rows above and below a pixel that what is compared of it depends on.
+    pub(crate) const fn reach(&self) -> usize {
+        match self.cost {
+            MatchCost::Census => census::REACH,
+            MatchCost::AbsoluteDifferences => 1,
+        }
+    }
+
+    /// Pixels around the middle of the window that must be valid: half a window, and the reach of what is compared. Left and
+    /// right, then above and below.
+    pub(crate) fn margins(&self) -> [usize; 2] {
+        [self.window_width, self.window_height].map(|edge| usize::from(edge) / 2 + self.reach())
+    }
 
     /// Checks every value.
     ///
@@ -86,10 +138,34 @@ impl MatchSettings {
         };
         range("matching.disparities", self.disparities, 8, 1024)?;
         range("matching.min_disparity", self.min_disparity, 0, 1000)?;
-        range("matching.window", self.window, Self::MIN_WINDOW, Self::MAX_WINDOW)?;
-        if self.window.is_multiple_of(2) {
-            return Err(ConfigError::new("matching.window", ConfigProblem::NotOdd));
+        for (field, edge) in
+            [("matching.window_width", self.window_width), ("matching.window_height", self.window_height)]
+        {
+            range(field, edge, Self::MIN_WINDOW, Self::MAX_WINDOW)?;
+            if edge.is_multiple_of(2) {
+                return Err(ConfigError::new(field, ConfigProblem::NotOdd));
+            }
         }
+        if self.wide_window_width > 0 {
+            range("matching.wide_window_width", self.wide_window_width, self.window_width, Self::MAX_WIDE_WINDOW)?;
+            if self.wide_window_width.is_multiple_of(2) {
+                return Err(ConfigError::new("matching.wide_window_width", ConfigProblem::NotOdd));
+            }
+        }
+        // Sums under a window have 16 bits.
+        let largest = match (self.cost, self.prefilter) {
+            (MatchCost::Census, _) => 8,
+            (MatchCost::AbsoluteDifferences, Prefilter::HorizontalSobel) => 62,
+            (MatchCost::AbsoluteDifferences, Prefilter::Grey) => 127,
+        };
+        let needed = usize::from(self.wide_window_width) * usize::from(self.window_height) * largest;
+        let capacity = usize::from(u16::MAX);
+        if needed > capacity {
+            let problem = ConfigProblem::OverCapacity { needed, capacity };
+            return Err(ConfigError::new("matching.wide_window_width x matching.window_height", problem));
+        }
+        range("matching.weak_texture", self.weak_texture, 0, 1000)?;
+        range("matching.wide_uniqueness_percent", self.wide_uniqueness_percent, 0, 100)?;
         range("matching.texture", self.texture, 0, 1000)?;
         range("matching.uniqueness_percent", self.uniqueness_percent, 0, 100)?;
         range("matching.back_check_px", self.back_check_px, 0, 64)?;

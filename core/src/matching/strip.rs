@@ -21,7 +21,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     /// The `ROWS` filtered rows around row `y`; `None` if one of them has not come yet, is no longer held or has no filtered
     /// row.
     pub(crate) fn strip<const ROWS: usize>(&self, y: usize) -> Option<Strip<'_, ROWS>> {
-        let first = y.checked_sub(ROWS / 2).filter(|&first| first > 0)?;
+        let first = y.checked_sub(ROWS / 2).filter(|&first| first >= self.rows.first_filtered())?;
         let newest = self.rows.newest_filtered()?;
         if newest + 1 < first + ROWS || newest >= first + KEPT {
             return None;

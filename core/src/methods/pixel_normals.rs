@@ -147,8 +147,9 @@ impl<const WIDTH: usize> PixelNormals<WIDTH> {
                 return;
             }
             let (Some(a), Some(b)) = (pixels.get(at).map(steps_of), pixels.get(from).map(steps_of)) else { return };
-            if a != 0 && b != 0 && a.abs_diff(b) <= step {
-                codes[at] = there + ONE_AWAY;
+            let contiguous = a != 0 && b != 0 && a.abs_diff(b) <= step;
+            if let Some(code) = codes.get_mut(at).filter(|_| contiguous) {
+                *code = there + ONE_AWAY;
             }
         };
         for y in 0..height {

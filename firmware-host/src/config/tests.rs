@@ -65,7 +65,7 @@ fn every_setting_is_documented_with_its_default() {
         }
         let (name, value) = line.split_once(" = ").unwrap();
         let name = if section.is_empty() { format!("`{name}`") } else { format!("`{section}.{name}`") };
-        let row = documented.lines().find(|row| row.contains(&name));
+        let row = documented.lines().filter(|row| row.starts_with('|')).find(|row| row.contains(&name));
         let row = row.unwrap_or_else(|| panic!("{name} is not in docs/files.md"));
         let value = value.trim_end_matches(".0");
         // The number of disparities follows the width of the pictures.

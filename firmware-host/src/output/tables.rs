@@ -116,7 +116,7 @@ fn cell_fields(view: &FrameView<'_>, geometry: &MapGeometry, row: &CellRow) -> O
         format!("{}.{}", row.content.height_dm / 10, row.content.height_dm % 10),
         row.content.confidence_percent.to_string(),
         words::doubt_name(row.content.doubt).to_string(),
-        has_cost.then(|| row.content.cost.to_string()).unwrap_or_default(),
+        if has_cost { row.content.cost.to_string() } else { String::new() },
     ])
 }
 
@@ -245,7 +245,7 @@ mod tests {
             made_up.detection.detectors = Detectors::new(kind, None);
             let content = Cell { state: CellState::Obstacle, cost: 17, ..Cell::default() };
             made_up.view(|view| tables.frame(view, &[CellRow { cell: (1, 1), content }])).unwrap();
-            assert_eq!(read(&folder, "cells.csv")[0].iter().last(), Some(expected), "{}", kind.name());
+            assert_eq!(read(&folder, "cells.csv")[0].iter().next_back(), Some(expected), "{}", kind.name());
         }
     }
 }
