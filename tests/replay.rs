@@ -46,12 +46,20 @@ pub fn replayed(name: &str, scratch: &Path) -> Option<PathBuf> {
 /// # Panics
 /// When a frame of the recording or the whole of it cannot be used.
 pub fn replay(recording: &Path, out: &Path) {
+    replay_with(recording, out, DetectorArgs::default());
+}
+
+/// Runs `fencepost replay` on a recording with arguments of its own for the detector.
+///
+/// # Panics
+/// When a frame of the recording or the whole of it cannot be used.
+pub fn replay_with(recording: &Path, out: &Path, detector: DetectorArgs) {
     let args = ReplayArgs {
         recording: recording.to_path_buf(),
         out: out.to_path_buf(),
         write: WRITE.to_vec(),
         frames: FrameRange::default(),
-        detector: DetectorArgs::default(),
+        detector,
     };
     let ending = commands::replay(&args, &mut Console::new(true, false));
     let ending = ending.unwrap_or_else(|failure| panic!("{}: {failure}", recording.display()));

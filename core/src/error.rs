@@ -39,6 +39,8 @@ pub enum ConfigProblem {
     NotARotation,
     /// Left and right are exchanged: the right camera lies to the left of the left one.
     Exchanged,
+    /// A detector cannot be checked against itself.
+    SameDetector,
 }
 
 impl ConfigError {
@@ -82,6 +84,7 @@ impl core::fmt::Display for ConfigProblem {
             Self::Exchanged => {
                 write!(f, "puts the right camera to the left of the left one: exchange the two")
             }
+            Self::SameDetector => write!(f, "is the detector itself: choose another one"),
         }
     }
 }

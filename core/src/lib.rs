@@ -25,6 +25,7 @@ pub mod ground;
 pub mod health;
 pub mod map;
 pub mod matching;
+pub mod methods;
 pub mod obstacles;
 pub mod picture;
 pub mod planes;

@@ -2,7 +2,13 @@
 
 use std::{num::ParseIntError, ops::Range, path::PathBuf, str::FromStr};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{
+    Args, Parser, Subcommand, ValueEnum,
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+};
+use fencepost_core::methods::DetectorKind;
+
+use crate::{compare::Method, words};
 
 /// Stereo obstacle detection: pictures from two cameras in, obstacle cells on a CAN bus out.
 #[derive(Debug, Parser)]
@@ -30,6 +36,13 @@ Examples:
       report.html
   fencepost replay garden --out out --frames 100..200 --write cells,can
       Only frames 100 to 199, only the tables and the CAN log
+  fencepost replay garden --out out --detector cost-map
+      The same with the detector that the LAGR robot had first
+  fencepost replay garden --out out --cross-check pixel-normals
+      A second detector checks the first: what they disagree on is never free
+  fencepost compare ~/recordings/garden --out out/compare
+      Every detector on the same pairs, side by side; scores where there is
+      truth
   fencepost cameras
       The cameras that are plugged in, and the lines of a rig's file for them
   fencepost record --config rig.toml --out ~/recordings/yard --seconds 60
@@ -58,6 +71,8 @@ pub enum Command {
     Demo(DemoArgs),
     /// Detect obstacles in a recording.
     Replay(ReplayArgs),
+    /// Run detectors over a recording side by side: pictures, scores, times and memory in one report.
+    Compare(CompareArgs),
     /// Run a rig: from its cameras to the CAN bus, until SIGTERM or SIGINT.
     Run(RunArgs),
     /// Say what a recording, a calibration or a configuration holds, and what the detector can see with it.
@@ -116,6 +131,28 @@ pub struct ReplayArgs {
     pub detector: DetectorArgs,
 }
 
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Folder of the recording.
+    pub recording: PathBuf,
+    /// The detectors, separated by commas; all of them if left out. `normalized-cuts` takes seconds for a frame.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', default_values_t = Method::ALL)]
+    pub detectors: Vec<Method>,
+    /// Folder to write to; made if it is not there. Files of an earlier run are replaced.
+    #[arg(long, value_name = "DIR", default_value = "out/compare")]
+    pub out: PathBuf,
+    /// Only these frames: `A..B` without B, `A..` to the end, or one number.
+    #[arg(long, value_name = "A..B", default_value = "..")]
+    pub frames: FrameRange,
+    /// Most frames whose pictures are in the report, spread over the recording.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u16).range(0..=100))]
+    pub show: u16,
+    /// Settings of the detectors.
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
@@ -125,6 +162,9 @@ pub struct RunArgs {
     /// Node id on the bus, in place of the one in the file.
     #[arg(long, value_name = "N")]
     pub node: Option<u8>,
+    /// How obstacles are found.
+    #[command(flatten)]
+    pub methods: MethodArgs,
     /// Stop after so many seconds.
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
@@ -145,6 +185,9 @@ pub struct DetectorArgs {
     /// Settings in TOML; `docs/files.md` lists them all.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// How obstacles are found.
+    #[command(flatten)]
+    pub methods: MethodArgs,
     /// Number of disparities searched, px; an eighth of the picture's width if left out.
     #[arg(long, value_name = "N")]
     pub disparities: Option<u16>,
@@ -154,6 +197,24 @@ pub struct DetectorArgs {
     /// Use CAN FD frames instead of classic ones.
     #[arg(long)]
     pub can_fd: bool,
+}
+
+/// How obstacles are found.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct MethodArgs {
+    /// Detector, in place of the one in the file.
+    #[arg(long, value_name = "NAME", value_parser = detector_names())]
+    pub detector: Option<DetectorKind>,
+    /// Second detector that looks at the same disparities: a cell that the two disagree on is never free.
+    #[arg(long, value_name = "NAME", value_parser = detector_names())]
+    pub cross_check: Option<DetectorKind>,
+}
+
+/// The names of all detectors: any other is an error that lists them.
+fn detector_names() -> impl TypedValueParser<Value = DetectorKind> {
+    let names = DetectorKind::ALL.map(|kind| PossibleValue::new(kind.name()).help(words::detector_words(kind)));
+    PossibleValuesParser::new(names)
+        .try_map(|name| DetectorKind::from_name(&name).ok_or_else(|| format!("`{name}` is no detector")))
 }
 
 /// Arguments of `check`.
@@ -388,6 +449,25 @@ mod tests {
         let Some(Command::Replay(args)) = cli.command else { panic!("not replay") };
         assert_eq!(args.write, [Output::Cells, Output::Can]);
         assert_eq!(args.frames, FrameRange::default());
+    }
+
+    #[test]
+    fn detectors_have_names_and_a_wrong_one_lists_them() {
+        let parse = |name: &str| {
+            Cli::try_parse_from(["fencepost", "replay", "r", "--out", "o", "--detector", name, "--cross-check", name])
+        };
+        for kind in DetectorKind::ALL {
+            let Some(Command::Replay(args)) = parse(kind.name()).unwrap().command else { panic!("not replay") };
+            let MethodArgs { detector, cross_check } = args.detector.methods;
+            assert_eq!((detector, cross_check), (Some(kind), Some(kind)));
+        }
+        let error = parse("costmap").unwrap_err().to_string();
+        for kind in DetectorKind::ALL {
+            assert!(error.contains(kind.name()), "{error}");
+        }
+        let run = ["fencepost", "run", "--config", "f", "--detector", "cost-map"];
+        let Some(Command::Run(args)) = Cli::try_parse_from(run).unwrap().command else { panic!("not run") };
+        assert_eq!(args.methods.detector, Some(DetectorKind::CostMap));
     }
 
     #[test]

@@ -17,6 +17,9 @@ pub struct Console {
     quiet: bool,
     verbose: bool,
     warnings: Vec<WarningCount>,
+    errors: Vec<String>,
+    /// Counts what it would say.
+    muted: bool,
     bar: Option<ProgressBar>,
 }
 
@@ -35,7 +38,14 @@ pub struct WarningCount {
 impl Console {
     /// `quiet` leaves out all but errors and warnings; `verbose` adds notes.
     pub const fn new(quiet: bool, verbose: bool) -> Self {
-        Self { quiet, verbose, warnings: Vec::new(), bar: None }
+        Self { quiet, verbose, warnings: Vec::new(), errors: Vec::new(), muted: false, bar: None }
+    }
+
+    /// A voice for work that is done again: it shows progress, and counts warnings and errors without saying them.
+    pub const fn muted(&self) -> Self {
+        let mut muted = Self::new(self.quiet, self.verbose);
+        muted.muted = true;
+        muted
     }
 
     /// Says a warning. Of one `kind` the first few are said, all are counted.
@@ -69,6 +79,15 @@ impl Console {
     /// Says an error; never left out.
     pub fn error(&self, error: impl fmt::Display) {
         self.say(format_args!("error: {error}"));
+    }
+
+    /// Says an error that may come again, the first time.
+    pub fn error_once(&mut self, error: impl fmt::Display) {
+        let text = error.to_string();
+        if !self.errors.contains(&text) {
+            self.error(&text);
+            self.errors.push(text);
+        }
     }
 
     /// Says something that happened while the program runs on; not counted, and not left out when it repeats.
@@ -123,6 +142,9 @@ impl Console {
     }
 
     fn say(&self, text: fmt::Arguments<'_>) {
+        if self.muted {
+            return;
+        }
         // Whoever listens may be gone, as when the output is piped into `head`: that is no reason to stop the work.
         let write = || {
             let _ = writeln!(std::io::stderr(), "{text}");

@@ -93,6 +93,7 @@ impl Failure {
             ConfigProblem::OutOfRange { min, max } if !from_input => {
                 format!("set {field} to {min} or more, {max} at most")
             }
+            ConfigProblem::SameDetector => format!("name another detector, or leave {field} out"),
             _ if from_input => "calibrate again, or correct the value by hand".to_string(),
             _ => format!("correct {field} in the configuration"),
         })

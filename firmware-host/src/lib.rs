@@ -4,8 +4,9 @@
 //! cli ──> commands ──> pipeline ──> detector (fencepost-core)
 //!           demo         │  frame by frame, as a view
 //!           replay       ├──> can_log    can.log
-//!           check        ├──> output     cells.csv, obstacles.csv, ground.csv
-//!           can decode   ├──> paint      disparity/, classes/, map/
+//!           compare      ├──> output     cells.csv, obstacles.csv, ground.csv
+//!           check        ├──> paint      disparity/, classes/, map/
+//!           can decode   ├──> score      how good it is, where a recording brings the truth
 //!                        ├──> summary    summary.json
 //!                        └──> report     report.html
 //! ```
@@ -21,6 +22,7 @@
 pub mod can_log;
 pub mod cli;
 pub mod commands;
+pub mod compare;
 pub mod config;
 pub mod console;
 pub mod detector;
@@ -32,8 +34,10 @@ pub mod output;
 pub mod paint;
 pub mod pipeline;
 pub mod record;
+pub mod reference;
 pub mod report;
 pub mod scans;
+pub mod score;
 pub mod source;
 pub mod stopwatch;
 pub mod summary;
@@ -63,6 +67,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match cli.command.unwrap_or_else(|| Command::Demo(DemoArgs::default())) {
         Command::Demo(args) => commands::demo(&args, &mut console),
         Command::Replay(args) => commands::replay(&args, &mut console),
+        Command::Compare(args) => commands::compare(&args, &mut console),
         Command::Run(args) => commands::run(&args, &mut console),
         Command::Check(args) => commands::check(&args, &mut console),
         Command::Record(args) => commands::record_rig(&args, &mut console),

@@ -20,9 +20,12 @@ use crate::{
     console::Console,
     detector::{self, ProgramDetector},
     error::Failure,
+    normalized_cuts::NormalizedCutSettings,
     output::{CellRow, OutputFolder, Tables},
     paint,
-    report::{Report, ReportFrame},
+    reference::Reference,
+    report::{Painter, Shown},
+    score::{CellCounts, Scorer, Scores},
     source::{Input, Source},
     stopwatch::{FrameTimes, Stopwatch, milliseconds},
     view::FrameView,
@@ -36,8 +39,12 @@ pub struct Job<'a> {
     pub folder: &'a OutputFolder,
     /// What to write.
     pub write: &'a [Output],
+    /// Most frames that are painted for a report.
+    pub show: usize,
     /// Settings of the detector.
     pub settings: Settings,
+    /// Settings of the detector outside the core, where that has the last word.
+    pub normalized_cuts: Option<NormalizedCutSettings>,
     /// Settings of the bus.
     pub wire: WireSettings,
     /// The configuration file, for errors.
@@ -53,6 +60,8 @@ pub struct Log {
     pub failures: Vec<FrameFailure>,
     /// What went on the bus.
     pub can: CanCounts,
+    /// What it is worth, where the recording brings the truth.
+    pub scores: Option<Scores>,
 }
 
 /// What is kept of each frame.
@@ -74,6 +83,8 @@ pub struct FrameRecord {
     pub obstacles: usize,
     /// Distance from the vehicle's origin to the centre of the nearest obstacle cell, metres.
     pub nearest_m: Option<f32>,
+    /// What the cells are worth, where there is truth of them.
+    pub cell_counts: Option<CellCounts>,
 }
 
 /// A frame that could not be used.
@@ -91,40 +102,47 @@ pub struct FrameFailure {
 ///
 /// # Errors
 /// When the calibration, the mount or the settings cannot be used, or the output cannot be written.
-pub fn run<S: Source>(
+pub fn run<S: Source, P: Painter>(
     input: &mut Input<S>,
     job: &Job<'_>,
+    painter: P,
     console: &mut Console,
     progress: &'static str,
-) -> Result<(Log, Report), Failure> {
+) -> Result<(Log, Shown<P>), Failure> {
     let mut detector = detector::lock();
     detector
         .configure(&job.settings, &input.calibration, &input.mount)
         .map_err(|error| Failure::config(error, job.config.file.as_deref()))?;
-    let mut pipeline = Pipeline::start(job, &detector, input.frames)?;
+    let mut pipeline = Pipeline::start(job, painter, &detector, input)?;
     console.start_progress(input.frames, progress);
     let result = pipeline.play(input, &mut detector, console);
     console.end_progress();
     // Whatever happened, the bus is told that the node stops, and what was found so far is handed on.
-    let Pipeline { can, mut log, report, .. } = pipeline;
+    let Pipeline { can, mut log, shown, scorer, .. } = pipeline;
     log.can = can.finish()?;
+    log.scores = scorer.and_then(|scorer| scorer.scores());
     result?;
-    Ok((log, report))
+    Ok((log, shown))
 }
 
-struct Pipeline<'a> {
+struct Pipeline<'a, P: Painter> {
     job: &'a Job<'a>,
     tables: Option<Tables>,
     can: CanLog,
-    report: Report,
+    shown: Shown<P>,
+    scorer: Option<Scorer>,
+    reference: Option<Reference>,
     log: Log,
     /// The left rectified picture, where pictures are wanted.
     left: Vec<u8>,
 }
 
-impl<'a> Pipeline<'a> {
-    fn start(job: &'a Job<'a>, detector: &ProgramDetector, frames: usize) -> Result<Self, Failure> {
+impl<'a, P: Painter> Pipeline<'a, P> {
+    fn start<S>(job: &'a Job<'a>, painter: P, detector: &ProgramDetector, input: &Input<S>) -> Result<Self, Failure> {
         let config = WireConfig::new(job.wire).map_err(|e| Failure::config(e, job.config.file.as_deref()))?;
+        let reference = job.normalized_cuts.as_ref();
+        let reference =
+            reference.map(|cuts| Reference::new(cuts, &job.settings, detector, &input.mount)).transpose()?;
         let folder = job.folder;
         let wants = |output| job.write.contains(&output);
         for (output, name) in [(Output::Disparity, "disparity"), (Output::Classes, "classes"), (Output::Map, "map")] {
@@ -137,7 +155,9 @@ impl<'a> Pipeline<'a> {
             job,
             tables: if wants(Output::Cells) { Some(Tables::create(folder)?) } else { None },
             can: CanLog::create(wants(Output::Can).then_some(folder), config)?,
-            report: Report::new(wants(Output::Report), frames),
+            shown: Shown::new(painter, job.show, input.frames),
+            reference,
+            scorer: input.truth.clone().map(|truth| Scorer::new(truth, job.settings.map.geometry)),
             log: Log::default(),
             left: vec![0; width * height],
         })
@@ -155,6 +175,9 @@ impl<'a> Pipeline<'a> {
             for warning in input.source.take_warnings() {
                 console.warn(warning);
             }
+            for complaint in self.scorer.iter_mut().flat_map(Scorer::take_complaints) {
+                console.warn_of_kind("truth", complaint);
+            }
             match result {
                 Ok(None) => return Ok(()),
                 Ok(Some(Ok(health))) => say_health(console, self.log.frames.last(), health),
@@ -166,11 +189,19 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    fn missing(&mut self, upcoming: Option<(u32, u64)>, failure: Failure, console: &Console) -> Result<(), Failure> {
-        console.error(&failure);
+    fn missing(
+        &mut self,
+        upcoming: Option<(u32, u64)>,
+        failure: Failure,
+        console: &mut Console,
+    ) -> Result<(), Failure> {
+        console.error_once(&failure);
         let (number, timestamp_ns) = upcoming.unzip();
         self.can.missing(timestamp_ns)?;
-        self.report.skipped();
+        self.shown.skipped();
+        if let (Some(scorer), Some(number)) = (&mut self.scorer, number) {
+            scorer.missing(number);
+        }
         self.log.failures.push(FrameFailure { number, timestamp_ns, failure });
         Ok(())
     }
@@ -203,6 +234,16 @@ impl<'a> Pipeline<'a> {
             vehicle,
             surface_at: &surface_at,
         };
+        let start = Instant::now();
+        let seen = self.reference.as_ref().map(|reference| reference.look(&view));
+        let seen_at = |x: usize, y: usize| seen.as_ref().and_then(|seen| seen.surface_at(x, y));
+        if let Some(seen) = &seen {
+            times.reference_ms = milliseconds(start.elapsed());
+            times.total_ms += times.reference_ms;
+            view.detection = seen.detection();
+            view.surface_at = &seen_at;
+        }
+        let detection = view.detection;
         let sent = self.can.scan(&view)?;
         view.health = self.can.health();
         times.wire_ms = milliseconds(sent.encoding);
@@ -211,6 +252,8 @@ impl<'a> Pipeline<'a> {
             tables.frame(&view, &sent.cells)?;
         }
         self.pictures(&view)?;
+        let score = |scorer: &mut Scorer| scorer.frame(view.number, &sent.cells, view.disparity);
+        let cell_counts = self.scorer.as_mut().and_then(score);
         let record = FrameRecord {
             number: view.number,
             timestamp_ns: view.timestamp_ns,
@@ -220,9 +263,10 @@ impl<'a> Pipeline<'a> {
             statistics: detection.statistics,
             obstacles: detection.obstacles.len(),
             nearest_m: nearest_cell_m(&sent.cells, &detection.map.geometry),
+            cell_counts,
         };
         self.log.frames.push(record);
-        self.report.frame(|| ReportFrame::paint(&view, &self.job.settings));
+        self.shown.frame(&view, &self.job.settings);
         Ok(view.health)
     }
 
@@ -231,7 +275,7 @@ impl<'a> Pipeline<'a> {
     }
 
     fn needs_left(&self) -> bool {
-        self.wants(Output::Classes) || self.report.wants_frame()
+        self.wants(Output::Classes) || self.shown.wants_frame() || self.reference.is_some()
     }
 
     /// The pictures of a frame; made after its times were taken.

@@ -1,6 +1,6 @@
 //! Where the pictures come from: a recording or the scene renderer.
 
-use std::{ops::Range, path::Path};
+use std::{ops::Range, path::Path, sync::Arc};
 
 use fencepost_core::geometry::{Mount, StereoCalibration};
 use fencepost_hal::{
@@ -9,7 +9,7 @@ use fencepost_hal::{
     recording::{RecordedCamera, Recording, RecordingError},
 };
 
-use crate::error::Failure;
+use crate::{error::Failure, score::RecordedTruth};
 
 /// A camera that ends, and knows what comes next.
 pub trait Source: Camera<Error: Into<Failure>> {
@@ -47,6 +47,8 @@ pub struct Input<S> {
     pub mount: Mount,
     /// Number of frames that will come.
     pub frames: usize,
+    /// What is really there, where the source knows it.
+    pub truth: Option<Arc<RecordedTruth>>,
     /// What is odd about it.
     pub warnings: Vec<String>,
 }
@@ -76,6 +78,7 @@ impl Input<RecordedCamera> {
                 .at(format!("--frames {}..{}", frames.start, frames.end))
                 .mend(format!("choose from {first} to {last}")));
         }
+        let (truth, complaint) = RecordedTruth::of(&recording);
         // The same folder may be written as `.` or with a slash at its end.
         let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
         let name = whole.file_name().map_or_else(|| folder.display().to_string(), |n| n.to_string_lossy().into_owned());
@@ -85,7 +88,8 @@ impl Input<RecordedCamera> {
             calibration: recording.calibration.stereo,
             mount: recording.mount,
             frames: recording.frames.len(),
-            warnings: recording.warnings.iter().map(ToString::to_string).collect(),
+            truth: truth.map(Arc::new),
+            warnings: recording.warnings.iter().map(ToString::to_string).chain(complaint).collect(),
             source: recording.into_camera(),
         })
     }
@@ -108,6 +112,7 @@ impl From<RecordingError> for Failure {
             RecordingError::Line { file, line, .. } => {
                 ("the line".to_string(), format!("{}: line {line}", file.display()))
             }
+            RecordingError::BadTruth { path, .. } => ("the truth".to_string(), path.display().to_string()),
             RecordingError::Unwritable { folder, .. } => ("the folder".to_string(), folder.display().to_string()),
             RecordingError::Calibration(error) => return error.clone().into(),
         };

@@ -19,6 +19,8 @@ pub struct Stopwatch {
 pub struct FrameTimes {
     /// By [`Stage`].
     pub stages_ms: [f64; STAGES],
+    /// A detector outside the core; 0 without one.
+    pub reference_ms: f64,
     /// From a scan to its CAN frames.
     pub wire_ms: f64,
     /// From the pair of pictures to the CAN frames.
@@ -40,7 +42,12 @@ impl Stopwatch {
     /// Stops and gives the times of the stages; `total` is the time of the whole call.
     pub fn finish(mut self, total: Duration) -> FrameTimes {
         self.stop(Instant::now());
-        FrameTimes { stages_ms: self.spent.map(milliseconds), wire_ms: 0.0, total_ms: milliseconds(total) }
+        FrameTimes {
+            stages_ms: self.spent.map(milliseconds),
+            reference_ms: 0.0,
+            wire_ms: 0.0,
+            total_ms: milliseconds(total),
+        }
     }
 
     fn stop(&mut self, now: Instant) {

@@ -13,6 +13,8 @@ use serde_json::{Value, json};
 
 use crate::{
     console::WarningCount,
+    error::Failure,
+    output::OutputFolder,
     pipeline::{FrameRecord, Job, Log},
     source::Input,
     stopwatch::TimeSummary,
@@ -40,6 +42,13 @@ pub fn stage_times(frames: &[FrameRecord]) -> Vec<StageTimes> {
         times: TimeSummary::of(frames.iter().map(|frame| frame.times.stages_ms[stage as usize])),
     };
     let mut stages: Vec<_> = Stage::ALL.into_iter().map(stage).collect();
+    if frames.iter().any(|frame| frame.times.reference_ms > 0.0) {
+        stages.push(StageTimes {
+            name: "reference",
+            words: "segments the picture by normalized cuts, outside the core",
+            times: TimeSummary::of(frames.iter().map(|frame| frame.times.reference_ms)),
+        });
+    }
     stages.push(StageTimes {
         name: "wire",
         words: "packs the scan into CAN frames",
@@ -82,6 +91,8 @@ pub fn summary<S>(input: &Input<S>, job: &Job<'_>, log: &Log, warnings: &[Warnin
     json!({
         "program": concat!("fencepost ", env!("CARGO_PKG_VERSION")),
         "recording": {"name": input.name, "description": input.description},
+        "detector": job.settings.detector,
+        "cross_check": job.settings.cross_check,
         "frames": {
             "detected": log.frames.len(),
             "failed": log.failures.len(),
@@ -94,6 +105,7 @@ pub fn summary<S>(input: &Input<S>, job: &Job<'_>, log: &Log, warnings: &[Warnin
         "ground": ground(&log.frames),
         "health": {"levels": levels, "reasons": reasons},
         "can": log.can,
+        "score": log.scores,
         "warnings": warnings,
         "failures": failures,
         "settings": job.settings,
@@ -101,6 +113,17 @@ pub fn summary<S>(input: &Input<S>, job: &Job<'_>, log: &Log, warnings: &[Warnin
         "mount": input.mount,
         "calibration": calibration(&input.calibration),
     })
+}
+
+/// Writes a summary to a folder.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write(folder: &OutputFolder, name: &str, summary: &Value) -> Result<(), Failure> {
+    let mut text = serde_json::to_string_pretty(summary)
+        .map_err(|error| Failure::work(format!("the summary cannot be made: {error}")).at(name))?;
+    text.push('\n');
+    folder.write(name, text.as_bytes())
 }
 
 /// Time from the first to the last frame, seconds.
@@ -129,6 +152,8 @@ fn counts(log: &Log) -> Value {
         "obstacles_dropped": sum(&|f| f.statistics.obstacles_dropped.into()),
         "cells_obstacle": sum(&|f| f.statistics.cells_obstacle.into()),
         "cells_free": sum(&|f| f.statistics.cells_free.into()),
+        "cells_disputed": sum(&|f| f.statistics.cells_disputed.into()),
+        "cells_unconfirmed": sum(&|f| f.statistics.cells_unconfirmed.into()),
         "cells_dropped": log.can.dropped_cells,
     })
 }
@@ -249,5 +274,25 @@ pub fn table(log: &Log) -> String {
         "CAN         {} frames: {} scans of at most {} frames, {} heartbeats",
         log.can.frames, log.can.scans, log.can.most_frames_per_scan, log.can.heartbeats
     ));
+    lines.extend(score_lines(log));
     lines.join("\n")
+}
+
+/// What the scores say, for the terminal.
+fn score_lines(log: &Log) -> Vec<String> {
+    let scores = log.scores.clone().unwrap_or_default();
+    let cells = scores.cells.map(|s| {
+        format!(
+            "truth       cells: F1 {:.3}, false alarms {:.4}, obstacles called free {:.4}, free cells found {:.3} ({} frames \
+             with lidar)",
+            s.f1, s.false_alarm, s.missed_free, s.free_found, s.frames
+        )
+    });
+    let disparity = scores.disparity.map(|s| {
+        format!(
+            "truth       disparity: density {:.3}, off by more than 3 px {:.4}, by more than 1 px {:.4}",
+            s.density, s.bad3, s.bad1
+        )
+    });
+    cells.into_iter().chain(disparity).collect()
 }

@@ -57,6 +57,7 @@ pub(crate) mod testing {
         ground::GroundPlane,
         health::{HealthLevel, HealthReason},
         map::{Cell, CellState, MapGeometry, ObstacleMap, SectorDistances, UnknownReason},
+        methods::Detectors,
         obstacles::Obstacle,
         surfaces::SurfaceClass,
     };
@@ -123,7 +124,7 @@ pub(crate) mod testing {
                     _ if ahead => CellState::Free,
                     _ => CellState::Unknown(UnknownReason::OutsideView),
                 };
-                self.detection.map.cells.push(Cell { state, pixels: 20, height_dm: 3 }).unwrap();
+                self.detection.map.cells.push(Cell { state, pixels: 20, height_dm: 3, ..Cell::default() }).unwrap();
             }
         }
 
@@ -179,6 +180,7 @@ pub(crate) mod testing {
             obstacles: [obstacle].into_iter().collect(),
             health,
             statistics: Statistics::default(),
+            detectors: Detectors::default(),
         }
     }
 }

@@ -4,6 +4,8 @@ use fencepost_core::{
     detector::Stage,
     disparity::Reason,
     health::{Health, HealthLevel, HealthReason},
+    map::Doubt,
+    methods::{DetectorKind, Detectors},
     wire::NodeState,
 };
 
@@ -39,6 +41,32 @@ pub const fn reason_words(reason: Reason) -> &'static str {
     }
 }
 
+/// Why a cell is less than certain, as it is written in files; empty where nobody doubts it.
+pub const fn doubt_name(doubt: Doubt) -> &'static str {
+    match doubt {
+        Doubt::None => "",
+        Doubt::Unconfirmed => "unconfirmed",
+        Doubt::Disputed => "disputed",
+    }
+}
+
+/// How a detector works, in words.
+pub const fn detector_words(kind: DetectorKind) -> &'static str {
+    match kind {
+        DetectorKind::SurfaceNormals => "surfaces inside tiles, told apart by their normals",
+        DetectorKind::CostMap => "points above the ground counted in columns",
+        DetectorKind::GroundDeviation => "deviations from the disparity of the ground",
+        DetectorKind::DisparitySegments => "contiguous segments of disparity, judged by size and height",
+        DetectorKind::PixelNormals => "segments of pixels, told apart by the normal around each",
+    }
+}
+
+/// The detectors of a frame for people.
+pub fn detectors(detectors: Detectors) -> String {
+    let main = detectors.main().name();
+    detectors.cross_check().map_or_else(|| main.to_string(), |check| format!("{main}, checked by {}", check.name()))
+}
+
 /// What a stage does, in words.
 pub const fn stage_words(stage: Stage) -> &'static str {
     match stage {
@@ -71,6 +99,9 @@ pub fn tilt_deg(value: i16) -> f64 {
 /// A number of bytes for people.
 pub fn bytes(count: usize) -> String {
     const KIB: f64 = 1024.0;
+    if count < 1024 {
+        return format!("{count} B");
+    }
     let count = count as f64;
     if count >= KIB * KIB { format!("{:.1} MiB", count / (KIB * KIB)) } else { format!("{:.0} KiB", count / KIB) }
 }

@@ -4,7 +4,7 @@ mod common;
 
 use std::fs;
 
-use common::{FRAMES, fencepost, recording, replay};
+use common::{FRAMES, add_true_disparity, fencepost, recording, replay};
 
 #[test]
 fn replay_writes_everything() {
@@ -132,6 +132,45 @@ fn the_report_is_one_file_that_loads_nothing() {
         assert!(!page.contains(word), "{word}");
     }
     assert!(page.contains("camera") && page.contains("<svg"));
+}
+
+#[test]
+fn a_recording_with_truth_is_scored() {
+    let recording = recording();
+    assert_eq!(replay(recording.path(), &["--write", "can"]).summary()["score"], serde_json::Value::Null);
+    add_true_disparity(recording.path());
+    let run = replay(recording.path(), &["--write", "can,report"]);
+    run.assert(0, &[]);
+    let score = &run.summary()["score"];
+    assert_eq!(score["cells"], serde_json::Value::Null);
+    let figure = |name: &str| score["disparity"][name].as_f64().unwrap();
+    assert!(figure("pixels") > 30_000.0 && figure("density") > 0.3 && figure("bad3") < 0.2, "{score}");
+    assert!(run.stdout.contains("truth       disparity: density"), "{}", run.stdout);
+    let page = fs::read_to_string(run.out.join("report.html")).unwrap();
+    assert!(page.contains("Against the truth") && page.contains("Disparity against truth"));
+}
+
+#[test]
+fn truth_that_cannot_be_used_is_said_and_left_out() {
+    let recording = recording();
+    add_true_disparity(recording.path());
+    let path = |name: &str| recording.path().join(name);
+    let whole = replay(recording.path(), &["--write", "can"]).summary()["score"]["disparity"]["pixels"].clone();
+    fs::write(path("disp_occ_0/000000.png"), b"a letter").unwrap();
+    fs::copy(path("image_0/000001.png"), path("disp_occ_0/000001.png")).unwrap();
+    let small = fencepost::paint::grey16_png(4, 4, &[256; 16]);
+    fs::write(path("disp_occ_0/000002.png"), small).unwrap();
+    let run = replay(recording.path(), &["--write", "can"]);
+    run.assert(0, &["frame 0", "000000.png", "cannot be decoded", "frame 1", "grey with 16 bits", "frame 2", "4 x 4"]);
+    let pixels = run.summary()["score"]["disparity"]["pixels"].clone();
+    assert!(pixels.as_u64().unwrap() > 0 && pixels.as_u64() < whole.as_u64(), "{pixels} of {whole}");
+
+    // Sweeps, and nothing that says how the lidar sits; then something that cannot be.
+    fs::create_dir(path("velodyne")).unwrap();
+    replay(recording.path(), &["--write", "can"]).assert(0, &["velodyne", "`Tr:`", "calib.txt"]);
+    let calibration = fs::read_to_string(path("calib.txt")).unwrap();
+    fs::write(path("calib.txt"), format!("{}\nTr: 1 0 0\n", calibration.trim_end())).unwrap();
+    replay(recording.path(), &["--write", "can"]).assert(0, &["Tr", "3x4", "not used"]);
 }
 
 #[test]

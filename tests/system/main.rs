@@ -4,12 +4,14 @@
 
 mod can_log;
 mod cells;
+mod detectors;
 mod disparity;
 mod golden;
 mod ground;
 mod health;
 mod joining;
 mod rover;
+mod scoring;
 mod slope;
 mod steadiness;
 mod stereoboard;

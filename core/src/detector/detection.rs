@@ -6,7 +6,8 @@ use crate::{
     disparity::DisparityPicture,
     ground::GroundPlane,
     health::{Health, HealthLevel},
-    map::{CellState, ObstacleMap, SectorDistances},
+    map::{CellState, Doubt, ObstacleMap, SectorDistances},
+    methods::Detectors,
     obstacles::Obstacle,
     surfaces::{Surface, SurfaceClass, SurfaceReport},
 };
@@ -32,6 +33,11 @@ pub struct Statistics {
     pub cells_obstacle: u32,
     /// Free cells.
     pub cells_free: u32,
+    /// Cells that the checking detector says the opposite of: obstacles that it calls free, and cells that would be free if it did
+    /// not call them obstacles.
+    pub cells_disputed: u32,
+    /// Obstacle and free cells that the checking detector does not know.
+    pub cells_unconfirmed: u32,
 }
 
 /// All that one pair of pictures says.
@@ -49,6 +55,8 @@ pub struct Detection<const OBSTACLES: usize, const CELLS: usize> {
     pub health: Health,
     /// Counts.
     pub statistics: Statistics,
+    /// The detector that found all this, and the one that checked it.
+    pub detectors: Detectors,
 }
 
 /// Why a pair of pictures was not looked at.
@@ -75,6 +83,7 @@ impl<const OBSTACLES: usize, const CELLS: usize> Detection<OBSTACLES, CELLS> {
             obstacles: Vec::new(),
             health: Health { level: HealthLevel::Ok, reasons: 0 },
             statistics: Statistics::NONE,
+            detectors: Detectors::DEFAULT,
         }
     }
 
@@ -106,6 +115,8 @@ impl Statistics {
         obstacles_dropped: 0,
         cells_obstacle: 0,
         cells_free: 0,
+        cells_disputed: 0,
+        cells_unconfirmed: 0,
     };
 
     /// Share of the pixels that have a disparity.
@@ -136,11 +147,22 @@ impl Statistics {
                 SurfaceClass::Slanted | SurfaceClass::Undefined => {}
             }
         }
+        self.count_cells(map);
+    }
+
+    /// Counts the cells anew.
+    pub(super) fn count_cells<const CELLS: usize>(&mut self, map: &ObstacleMap<CELLS>) {
+        (self.cells_obstacle, self.cells_free, self.cells_disputed, self.cells_unconfirmed) = (0, 0, 0, 0);
         for cell in &map.cells {
             match cell.state {
                 CellState::Obstacle => self.cells_obstacle += 1,
                 CellState::Free => self.cells_free += 1,
                 CellState::Unknown(_) => {}
+            }
+            match cell.doubt {
+                Doubt::None => {}
+                Doubt::Unconfirmed => self.cells_unconfirmed += 1,
+                Doubt::Disputed => self.cells_disputed += 1,
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The whole detector: one call from a pair of pictures to obstacle cells.
 
 mod detection;
+mod interpreter;
 mod memory;
 mod stage;
 
@@ -11,21 +12,20 @@ pub use stage::{Probe, Stage};
 use crate::{
     disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
-    geometry::{DepthTable, Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
-    ground::GroundFinder,
+    geometry::{Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
     health::{
         self, Content, ContentSigns, Debounce, Exposure, HealthLevel, HealthSettings, RecentPictures, SearchRange,
         Signs,
     },
-    map::{MapBuilder, SectorDistances, View},
+    map::SectorDistances,
     matching::{MatchSettings, Matcher, ValidSpan},
-    obstacles::ObstacleFinder,
     picture::Picture,
     rectify::{Rectifier, Side},
     settings::Settings,
-    surfaces::{Regions, Surface, Surfaces},
+    surfaces::{Surface, Surfaces},
     validate::SurfaceSize,
 };
+use interpreter::Interpreter;
 
 /// Rows that are matched the other way round when left and right may be exchanged.
 const EXCHANGE_ROWS: usize = 8;
@@ -53,12 +53,7 @@ pub struct Detector<
     matcher: Matcher<WIDTH, DISPARITIES>,
     disparity: [DisparityPixel; PIXELS],
     surface_size: SurfaceSize<WIDTH>,
-    depth: DepthTable<DISPARITIES>,
-    surfaces: Surfaces<PIXELS, SURFACES>,
-    regions: Regions<SURFACES>,
-    ground: GroundFinder,
-    obstacles: ObstacleFinder,
-    map: MapBuilder<CELLS>,
+    interpreter: Interpreter<PIXELS, WIDTH, DISPARITIES, SURFACES, CELLS>,
     health: HealthSettings,
     content: Content<WIDTH>,
     content_signs: ContentSigns,
@@ -103,12 +98,7 @@ impl<
             matcher: Matcher::new(),
             disparity: [DisparityPixel::from_bits(0); PIXELS],
             surface_size: SurfaceSize::new(),
-            depth: DepthTable::new(),
-            surfaces: Surfaces::new(),
-            regions: Regions::new(),
-            ground: GroundFinder::new(),
-            obstacles: ObstacleFinder::new(),
-            map: MapBuilder::new(),
+            interpreter: Interpreter::new(),
             health: HealthSettings::UNSET,
             content: Content::new(),
             content_signs: ContentSigns::UNSET,
@@ -137,32 +127,27 @@ impl<
         let rotation = self.rectifier.rotation(Side::Left);
         let [vehicle_frame, frame] = frames.map(|frame| rotation.map_or(frame, |rotation| frame.turned(rotation)));
         let (width, height) = (pair.width as usize, pair.height as usize);
-        self.surfaces.configure(&settings.surfaces, width, height)?;
         self.matcher.configure(&settings.matching, width, height)?;
         self.surface_size.configure(&settings.validate, width)?;
         let MatchSettings { min_disparity, disparities, .. } = settings.matching;
-        self.depth.configure(&pair, min_disparity, disparities);
-        self.ground.configure(&settings.ground, &frame, mount.height_m.is_some(), width * height)?;
-        self.obstacles.configure(&settings.obstacles, pair.focal_px)?;
-        self.map.configure(&settings.map, (settings.obstacles.min_height_m, settings.obstacles.clearance_m))?;
-        settings.health.check()?;
-        self.health = settings.health;
-        self.forget_pictures();
-        self.debounce = Debounce::new(settings.health.trigger_frames, settings.health.release_frames);
         // The last disparity has no neighbour to interpolate with and is never reported.
         let largest = f32::from(min_disparity) + f32::from(disparities) - 2.0;
-        let nearest_m = pair.distance_m(largest);
-        let picture_sizes = [Side::Left, Side::Right].map(|side| self.rectifier.raw_size(side));
-        self.setup = Some(Setup {
+        let setup = Setup {
             pair,
-            picture_sizes,
+            picture_sizes: [Side::Left, Side::Right].map(|side| self.rectifier.raw_size(side)),
             vehicle_frame,
             frame,
             place: Place::new(mount),
             rays: Rays::new(&pair, &frame),
-            nearest_m,
+            nearest_m: pair.distance_m(largest),
             sector_width_deg: settings.map.sector_width_deg,
-        });
+        };
+        self.interpreter.configure(settings, &setup, mount.height_m.is_some())?;
+        settings.health.check()?;
+        self.health = settings.health;
+        self.forget_pictures();
+        self.debounce = Debounce::new(settings.health.trigger_frames, settings.health.release_frames);
+        self.setup = Some(setup);
         Ok(())
     }
 
@@ -177,7 +162,7 @@ impl<
     /// # Bound
     /// The clearing of counts and lengths; no buffer is gone through.
     pub fn forget(&mut self) {
-        self.ground.forget();
+        self.interpreter.forget();
         self.forget_pictures();
         self.debounce.interrupt();
         self.detection.clear();
@@ -218,26 +203,8 @@ impl<
         let disparity = &mut self.disparity[..width * height];
         self.surface_size.run(disparity);
 
-        probe.enter(Stage::Surfaces);
         let picture = DisparityPicture::new(disparity, width);
-        let report = self.surfaces.run(picture, &self.depth, &setup.rays);
-
-        probe.enter(Stage::Ground);
-        let ground = self.ground.run(&mut self.surfaces, &mut self.regions, picture, (&self.depth, &setup.rays));
-        let terrain = self.ground.terrain();
-
-        probe.enter(Stage::Obstacles);
-        let detection = &mut self.detection;
-        let found = &mut detection.obstacles;
-        detection.statistics.obstacles_dropped =
-            self.obstacles.run(&mut self.surfaces, &mut self.regions, picture, terrain, &setup.place, found);
-
-        probe.enter(Stage::Map);
-        let Setup { pair, frame, place, rays, nearest_m, .. } = &setup;
-        let view = View { pair, frame, place, rays, depth: &self.depth, nearest_m: *nearest_m };
-        self.map.run(&self.surfaces, picture, &view, terrain, ground.is_some(), &mut detection.map);
-        detection.ground = ground.map(|plane| plane.moved(place));
-        detection.statistics.count(picture, report, self.surfaces.table(), &detection.map);
+        self.interpreter.run(picture, &setup, &mut self.detection, probe);
 
         probe.enter(Stage::Health);
         let suspect = 100.0 * self.detection.statistics.coverage() < self.health.exchange_test_percent;
@@ -258,7 +225,7 @@ impl<
         // What is told may come later than what is found, and stay longer; what is free must be right at any time.
         if findings.health().level.max(told.level) >= HealthLevel::Blind {
             self.detection.map.withhold_free();
-            self.detection.statistics.cells_free = 0;
+            self.detection.statistics.count_cells(&self.detection.map);
         }
         self.detection.health = told;
         self.detection.sectors = SectorDistances::of(&self.detection.map, setup.sector_width_deg);
@@ -362,12 +329,12 @@ impl<
 
     /// The surface at pixel `(x, y)` of the last pair.
     pub fn surface_at(&self, x: usize, y: usize) -> Option<&Surface> {
-        self.surfaces.surface_at(x, y)
+        self.interpreter.surfaces.surface_at(x, y)
     }
 
     /// The surfaces of the last pair and the tables behind them.
     pub const fn surfaces(&self) -> &Surfaces<PIXELS, SURFACES> {
-        &self.surfaces
+        &self.interpreter.surfaces
     }
 
     /// What the last pair of pictures said about the cameras.

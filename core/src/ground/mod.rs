@@ -125,6 +125,16 @@ impl GroundFinder {
         plane
     }
 
+    /// Exchanges the ground of the frame before for that of another detector, which looks at the same pictures in turn.
+    pub(crate) const fn exchange(&mut self, other: &mut Option<GroundPlane>) {
+        core::mem::swap(&mut self.last, other);
+    }
+
+    /// Has heights measured from `plane`, without bends, after a detector that finds the ground in its own way.
+    pub(crate) fn flatten(&mut self, plane: GroundPlane) {
+        self.terrain.flatten(plane);
+    }
+
     /// Where heights are measured from, after [`Self::run`].
     pub const fn terrain(&self) -> &Terrain {
         &self.terrain

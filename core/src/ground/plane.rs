@@ -55,7 +55,7 @@ impl GroundPlane {
         Self::new([0.0, 0.0, 1.0], 0.0, frame)
     }
 
-    fn new(normal: [f32; 3], offset_m: f32, frame: &VehicleFrame) -> Self {
+    pub(crate) fn new(normal: [f32; 3], offset_m: f32, frame: &VehicleFrame) -> Self {
         let camera_m = frame.point([0.0; 3]);
         // How far the camera's axes point below the plane.
         let [right, down, forward] =

@@ -36,7 +36,7 @@ pub struct GroundSettings {
 
 impl GroundSettings {
     /// All zero, for a stage that is not configured.
-    pub(super) const UNSET: Self = Self {
+    pub(crate) const UNSET: Self = Self {
         max_tilt_deg: 0.0,
         height_tolerance_m: 0.0,
         fit_tolerance_m: 0.0,

@@ -1,6 +1,6 @@
 //! From classified surfaces to cells.
 
-use super::{Cell, CellState, MapSettings, ObstacleMap, UnknownReason, shadow};
+use super::{Cell, CellState, MapGeometry, MapSettings, ObstacleMap, UnknownReason, cells::floor, shadow};
 use crate::{
     disparity::{DisparityPicture, Reason},
     error::ConfigError,
@@ -28,15 +28,27 @@ pub struct View<'a, const DISPARITIES: usize> {
 
 /// What the pixels say of one cell.
 #[derive(Clone, Copy, Debug, Default)]
-struct Evidence {
+pub(crate) struct Evidence {
     /// Pixels of obstacles between the least height and the clearance.
-    obstacle: u16,
+    pub(crate) obstacle: u16,
     /// Pixels of surfaces on the ground.
-    ground: u16,
+    pub(crate) ground: u16,
     /// Other pixels too high for a free cell.
-    unclear: u16,
+    pub(crate) unclear: u16,
     /// Greatest height of an obstacle pixel, decimetres.
-    height_dm: u8,
+    pub(crate) height_dm: u8,
+}
+
+/// What a pixel says of a cell, where a detector decides by itself what its pixels say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Vote {
+    /// Ground was seen.
+    Ground,
+    /// Something stands there.
+    Obstacle {
+        /// Height above the ground, metres.
+        height_m: f32,
+    },
 }
 
 /// What a pixel counts as, once for each run of pixels of one surface.
@@ -103,8 +115,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         ground_seen: bool,
         map: &mut ObstacleMap<CELLS>,
     ) {
-        let geometry = self.settings.geometry;
-        self.evidence[..geometry.len()].fill(Evidence::default());
+        self.begin();
         // The surfaces of another picture say nothing about this one.
         let height = if (picture.width(), picture.height()) == surfaces.size() { picture.height() } else { 0 };
         for y in 0..height {
@@ -112,12 +123,54 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
                 self.collect(surfaces, picture, view, ground, (x, y));
             }
         }
+        self.finish(picture, view, ground, ground_seen, map, |_, cell| cell);
+    }
+
+    /// Begins a map for which nothing was seen.
+    pub(crate) fn begin(&mut self) {
+        self.table().fill(Evidence::default());
+    }
+
+    /// Where the cells lie.
+    pub(crate) const fn geometry(&self) -> MapGeometry {
+        self.settings.geometry
+    }
+
+    /// What was said of each cell: room for numbers by cell, before [`Self::begin`].
+    pub(crate) fn table(&mut self) -> &mut [Evidence] {
+        &mut self.evidence[..self.settings.geometry.len()]
+    }
+
+    /// What a pixel says of the cell at `[x, y]` of the vehicle frame, metres.
+    pub(crate) fn vote(&mut self, [x, y]: [f32; 2], vote: Vote) {
+        let place = self.settings.geometry.index_at(x, y);
+        let Some(evidence) = place.and_then(|place| self.evidence.get_mut(place)) else { return };
+        match vote {
+            Vote::Ground => evidence.ground = evidence.ground.saturating_add(1),
+            Vote::Obstacle { height_m } => {
+                evidence.obstacle = evidence.obstacle.saturating_add(1);
+                evidence.height_dm = evidence.height_dm.max((height_m * 10.0) as u8);
+            }
+        }
+    }
+
+    /// Fills `map` by what was said since [`Self::begin`]; `verdict` has the last word on each cell.
+    pub(crate) fn finish<const DISPARITIES: usize>(
+        &self,
+        picture: DisparityPicture<'_>,
+        view: &View<'_, DISPARITIES>,
+        ground: &Terrain,
+        ground_seen: bool,
+        map: &mut ObstacleMap<CELLS>,
+        verdict: impl Fn(&Evidence, Cell) -> Cell,
+    ) {
+        let geometry = self.settings.geometry;
         map.geometry = geometry;
         map.cells.clear();
         for index in 0..geometry.len() {
             let cell = self.decide(index, picture, view, ground, ground_seen);
             // Cannot fail: `configure` made sure that there is room.
-            let _ = map.cells.push(cell);
+            let _ = map.cells.push(verdict(&self.evidence[index], cell));
         }
         shadow::mark(map, view.place);
     }
@@ -229,11 +282,12 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             (self.settings.obstacle_cover * obstacle_area).max(f32::from(self.settings.obstacle_min_pixels));
         let need_free = (self.settings.free_cover * across * along).max(f32::from(self.settings.free_min_pixels));
         if f32::from(evidence.obstacle) >= need_obstacle {
-            return Cell { state: CellState::Obstacle, pixels: evidence.obstacle, height_dm: evidence.height_dm };
+            let (pixels, height_dm) = (evidence.obstacle, evidence.height_dm);
+            return Cell { state: CellState::Obstacle, pixels, height_dm, ..Cell::CERTAIN };
         }
         let against = f32::from(evidence.obstacle) + f32::from(evidence.unclear);
         if ground_seen && f32::from(evidence.ground) >= need_free && against < 0.5 * need_obstacle {
-            return Cell { state: CellState::Free, pixels: evidence.ground, height_dm: 0 };
+            return Cell { state: CellState::Free, pixels: evidence.ground, ..Cell::CERTAIN };
         }
         unknown(match seen.pixel {
             None => UnknownReason::OutsideView,
@@ -285,10 +339,4 @@ impl Sight {
         let inside = u >= 0.0 && v >= 0.0 && u < view.pair.width as f32 && v < view.pair.height as f32;
         Some(Self { distance_m, pixel: inside.then_some((u as usize, v as usize)) })
     }
-}
-
-/// Largest whole number not above `x`, within i16.
-fn floor(x: f32) -> i16 {
-    let whole = x as i16;
-    if f32::from(whole) > x { whole.saturating_sub(1) } else { whole }
 }

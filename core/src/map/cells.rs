@@ -27,6 +27,21 @@ pub enum UnknownReason {
     Dropped = 8,
     /// Perhaps seen to be free, but in a picture that cannot be trusted.
     NotTrusted = 9,
+    /// Free for one detector and an obstacle for the one that checks it.
+    Disputed = 10,
+}
+
+/// What the detector that checks another one thinks of a cell that is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Doubt {
+    /// It says the same, or nobody checks.
+    #[default]
+    None = 0,
+    /// It does not know the cell.
+    Unconfirmed = 1,
+    /// It says the opposite.
+    Disputed = 2,
 }
 
 /// What is known of a cell.
@@ -49,9 +64,26 @@ pub struct Cell {
     pub pixels: u16,
     /// Height of the highest obstacle pixel above the ground, decimetres; 0 where there is none; saturates.
     pub height_dm: u8,
+    /// Traversal cost: the number of obstacle points in the column. Only [`crate::methods::DetectorKind::CostMap`] has one; 0
+    /// otherwise; saturates.
+    pub cost: u16,
+    /// Confidence in the state, percent; less than 100 where a second detector disagrees, 0 where the cell is unknown.
+    pub confidence_percent: u8,
+    /// Why the confidence is less than 100.
+    pub doubt: Doubt,
 }
 
 impl Cell {
+    /// A cell that nobody doubts, to be given its state.
+    pub(crate) const CERTAIN: Self = Self {
+        state: CellState::Unknown(UnknownReason::OutsideView),
+        pixels: 0,
+        height_dm: 0,
+        cost: 0,
+        confidence_percent: 100,
+        doubt: Doubt::None,
+    };
+
     /// The cell, unless it is free: then nothing is known of it.
     #[must_use]
     pub(crate) fn without_free(self) -> Self {
@@ -64,7 +96,14 @@ impl Cell {
 
 impl Default for Cell {
     fn default() -> Self {
-        Self { state: CellState::Unknown(UnknownReason::OutsideView), pixels: 0, height_dm: 0 }
+        Self {
+            state: CellState::Unknown(UnknownReason::OutsideView),
+            pixels: 0,
+            height_dm: 0,
+            cost: 0,
+            confidence_percent: 0,
+            doubt: Doubt::None,
+        }
     }
 }
 
@@ -118,6 +157,12 @@ impl MapGeometry {
         Some(a as usize * self.y_count as usize + b as usize)
     }
 
+    /// Place in the table of the cell at `(x, y)`, metres.
+    pub(crate) fn index_at(&self, x_m: f32, y_m: f32) -> Option<usize> {
+        let per_cell = 1.0 / self.cell_size_m();
+        self.index(floor(x_m * per_cell), floor(y_m * per_cell))
+    }
+
     /// Cell `(i, j)` at a place in the table.
     pub const fn cell_at(&self, index: usize) -> (i16, i16) {
         let columns = if self.y_count == 0 { 1 } else { self.y_count as usize };
@@ -153,4 +198,10 @@ impl<const CELLS: usize> ObstacleMap<CELLS> {
             *cell = cell.without_free();
         }
     }
+}
+
+/// Largest whole number not above `x`, within i16.
+pub(super) fn floor(x: f32) -> i16 {
+    let whole = x as i16;
+    if f32::from(whole) > x { whole.saturating_sub(1) } else { whole }
 }

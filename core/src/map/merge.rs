@@ -20,7 +20,8 @@ pub struct OtherCells {
 ///
 /// A cell that one pair calls an obstacle is an obstacle, whatever the others say: what stands there may be hidden from them, too
 /// near for them, or stand in the part of the cell that they do not see, and a false stop costs less than a collision. A cell
-/// that one pair saw to be free is free where no other speaks against it: a pair that did not see the cell knows nothing of it.
+/// that one pair saw to be free is free where no other speaks against it: a pair that did not see the cell knows nothing of it;
+/// one whose two detectors dispute it speaks against it.
 /// Of a cell that nobody knows, the reason is that of the pair that came closest to seeing it.
 ///
 /// With one pair all of it is exactly what that pair says. Nothing is larger than the map itself, and nothing of it lies on the
@@ -149,9 +150,22 @@ impl<const CELLS: usize> Default for Merged<CELLS> {
 /// What two pairs say of one cell.
 fn together(a: Cell, b: Cell) -> Cell {
     use CellState::{Free, Obstacle, Unknown};
-    let both = Cell { state: a.state, pixels: a.pixels.max(b.pixels), height_dm: a.height_dm.max(b.height_dm) };
+    use UnknownReason::Disputed;
+    // What one pair's second detector doubts, another pair may have seen for certain.
+    let surer = if b.confidence_percent > a.confidence_percent { b } else { a };
+    let both = Cell {
+        state: a.state,
+        pixels: a.pixels.max(b.pixels),
+        height_dm: a.height_dm.max(b.height_dm),
+        cost: a.cost.max(b.cost),
+        confidence_percent: surer.confidence_percent,
+        doubt: if a.confidence_percent == b.confidence_percent { a.doubt.min(b.doubt) } else { surer.doubt },
+    };
     match (a.state, b.state) {
         (Obstacle, Obstacle) | (Free, Free) => both,
+        // One of the two detectors of a pair sees something there: that speaks against free.
+        (Unknown(Disputed), Free) => a,
+        (Free, Unknown(Disputed)) => b,
         (Obstacle, _) | (Free, Unknown(_)) => a,
         (_, Obstacle) | (Unknown(_), Free) => b,
         (Unknown(reason), Unknown(other)) if nearness(other) > nearness(reason) => b,
@@ -172,6 +186,7 @@ const fn nearness(reason: UnknownReason) -> u8 {
         UnknownReason::NoGround => 7,
         UnknownReason::NotTrusted => 8,
         UnknownReason::Dropped => 9,
+        UnknownReason::Disputed => 10,
     }
 }
 

@@ -3,11 +3,12 @@
 use std::{boxed::Box, vec::Vec};
 
 use super::*;
+use crate::map::Doubt;
 use crate::test_random::Random;
 
 const CELLS: usize = 2500;
 const GEOMETRY: MapGeometry = MapGeometry { cell_size_mm: 500, x_first: -10, x_count: 40, y_first: -30, y_count: 60 };
-const REASONS: [UnknownReason; 10] = [
+const REASONS: [UnknownReason; 11] = [
     UnknownReason::OutsideView,
     UnknownReason::TooFar,
     UnknownReason::TooNear,
@@ -18,16 +19,21 @@ const REASONS: [UnknownReason; 10] = [
     UnknownReason::NoGround,
     UnknownReason::NotTrusted,
     UnknownReason::Dropped,
+    UnknownReason::Disputed,
 ];
 
 fn random_map(random: &mut Random) -> Box<ObstacleMap<CELLS>> {
     let mut map = Box::new(ObstacleMap { geometry: GEOMETRY, ..ObstacleMap::EMPTY });
     for _ in 0..GEOMETRY.len() {
         let pixels = random.below(65_536) as u16;
+        let (confidence_percent, doubt) =
+            [(100, Doubt::None), (80, Doubt::Unconfirmed), (50, Doubt::Disputed)][random.below(3) as usize];
+        let known = Cell { pixels, confidence_percent, doubt, ..Cell::default() };
+        let (height_dm, cost) = (random.below(256) as u8, random.below(65_536) as u16);
         let cell = match random.below(3) {
-            0 => Cell { state: CellState::Obstacle, pixels, height_dm: random.below(256) as u8 },
-            1 => Cell { state: CellState::Free, pixels, height_dm: 0 },
-            _ => Cell { state: CellState::Unknown(REASONS[random.below(10) as usize]), ..Cell::default() },
+            0 => Cell { state: CellState::Obstacle, height_dm, cost, ..known },
+            1 => Cell { state: CellState::Free, ..known },
+            _ => Cell { state: CellState::Unknown(REASONS[random.below(11) as usize]), ..Cell::default() },
         };
         map.cells.push(cell).unwrap();
     }
@@ -79,6 +85,12 @@ fn every_cell_follows_the_rules_in_any_order() {
                 assert_eq!(cell.state, CellState::Obstacle);
                 assert_eq!(Some(cell.pixels), of(CellState::Obstacle).map(|(_, c)| c.pixels).max());
                 assert_eq!(Some(cell.height_dm), of(CellState::Obstacle).map(|(_, c)| c.height_dm).max());
+                assert_eq!(Some(cell.cost), of(CellState::Obstacle).map(|(_, c)| c.cost).max());
+                let surest = of(CellState::Obstacle).map(|(_, c)| (c.confidence_percent, c.doubt)).max_by_key(|c| c.0);
+                assert_eq!(Some((cell.confidence_percent, cell.doubt)), surest);
+            } else if of(CellState::Unknown(UnknownReason::Disputed)).count() > 0 {
+                // Nobody's free counts where another pair's detectors disagree.
+                assert_eq!(cell.state, CellState::Unknown(UnknownReason::Disputed));
             } else if of(CellState::Free).count() > 0 {
                 assert_eq!(cell.state, CellState::Free);
                 assert_eq!(Some(cell.pixels), of(CellState::Free).map(|(_, c)| c.pixels).max());
@@ -97,6 +109,7 @@ fn every_cell_follows_the_rules_in_any_order() {
                     UnknownReason::TooNear => 2,
                     UnknownReason::NotTrusted => 8,
                     UnknownReason::Dropped => 9,
+                    UnknownReason::Disputed => 10,
                     other => place(other).unwrap(),
                 };
                 assert_eq!(Some(order(reason)), said.iter().map(|r| order(*r)).max());

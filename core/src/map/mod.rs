@@ -7,8 +7,9 @@ mod sectors;
 mod settings;
 mod shadow;
 
+pub(crate) use builder::{Evidence, Vote};
 pub use builder::{MapBuilder, View};
-pub use cells::{Cell, CellState, MapGeometry, ObstacleMap, UnknownReason};
+pub use cells::{Cell, CellState, Doubt, MapGeometry, ObstacleMap, UnknownReason};
 pub use merge::{Merged, OtherCells};
 pub use sectors::{SECTOR_CLEAR_DM, SECTOR_COUNT, SECTOR_UNKNOWN, SectorDistances};
 pub use settings::MapSettings;

@@ -48,7 +48,7 @@ impl Obstacle {
 
 /// Half the length of a uniform distribution in standard deviations: extents are told from the moments, so that a few stray
 /// pixels do not stretch them.
-const HALF_LENGTH: f32 = 1.732_050_8;
+pub(crate) const HALF_LENGTH: f32 = 1.732_050_8;
 
 /// Joins surfaces that stand up from the ground into obstacles.
 ///

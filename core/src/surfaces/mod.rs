@@ -17,7 +17,8 @@ use crate::{
     planes::Scatter,
 };
 use moments::{Moments, RowMoments};
-use tile::{MAX_SURFACES, Tile, TileUnion};
+pub(crate) use tile::CODES;
+use tile::{CODE_SHIFT, MAX_SURFACES, NUMBER_MASK, Tile, TileUnion};
 
 /// Edge of a tile, px. The paper, section 4.4.
 pub const TILE: usize = 32;
@@ -152,6 +153,36 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         depth: &DepthTable<DISPARITIES>,
         rays: &Rays,
     ) -> SurfaceReport {
+        self.find::<DISPARITIES, false>(picture, depth, rays, &[SurfaceClass::Undefined; CODES])
+    }
+
+    /// As [`Self::run`], with surfaces of pixels that have one class each: those that [`Self::codes_mut`] holds, below [`CODES`].
+    /// A surface gets the class that `classes` has for them, whatever its own plane says.
+    pub(crate) fn run_coded<const DISPARITIES: usize>(
+        &mut self,
+        picture: DisparityPicture<'_>,
+        depth: &DepthTable<DISPARITIES>,
+        rays: &Rays,
+        classes: &[SurfaceClass; CODES],
+    ) -> SurfaceReport {
+        self.find::<DISPARITIES, true>(picture, depth, rays, classes)
+    }
+
+    /// A byte for each pixel, row by row: room for what a method knows of the pixels before [`Self::run_coded`] makes surfaces of
+    /// them. The surfaces of the picture before are forgotten.
+    pub(crate) fn codes_mut(&mut self) -> &mut [u8] {
+        self.tiles.clear();
+        self.table.clear();
+        &mut self.labels[..self.width * self.height]
+    }
+
+    fn find<const DISPARITIES: usize, const CODED: bool>(
+        &mut self,
+        picture: DisparityPicture<'_>,
+        depth: &DepthTable<DISPARITIES>,
+        rays: &Rays,
+        classes: &[SurfaceClass; CODES],
+    ) -> SurfaceReport {
         self.tiles.clear();
         self.table.clear();
         if (picture.width(), picture.height()) != (self.width, self.height) {
@@ -161,17 +192,19 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         let mut found = 0;
         for tile in Tile::all(self.width, self.height) {
             let covers = |steps| depth.inverse(steps) != 0;
-            found += u32::from(self.union.label(pixels, self.width, tile, &self.settings, covers, &mut self.labels));
+            let Self { union, settings, labels, width, .. } = self;
+            found += u32::from(union.label::<CODED>(pixels, *width, tile, settings, covers, labels));
         }
         let mut keep = KeepRule::everything();
         if found as usize > SURFACES {
-            keep = self.keep_largest();
+            keep = self.keep_largest::<CODED>();
         }
         for tile in Tile::all(self.width, self.height) {
             let first = self.table.len() as u16;
             // Cannot fail: `configure` made sure that there is room for every tile.
             let _ = self.tiles.push(first);
-            self.measure(pixels, tile, depth, rays, &mut keep);
+            let given = if CODED { Some(self.take_classes(tile, classes)) } else { None };
+            self.measure(pixels, tile, depth, rays, &mut keep, given.as_ref());
         }
         SurfaceReport { found, dropped: found - self.table.len() as u32 }
     }
@@ -224,7 +257,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
     }
 
     /// The size from which on the table has room for all surfaces.
-    fn keep_largest(&mut self) -> KeepRule {
+    fn keep_largest<const CODED: bool>(&mut self) -> KeepRule {
         // Sizes are counted from the largest down; the union's counters are free now.
         let by_size = self.union.scratch();
         by_size.fill(0);
@@ -232,6 +265,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             let mut pixels = [0u16; MAX_SURFACES];
             for y in tile.y..tile.y + tile.height {
                 for &label in &self.labels[y * self.width + tile.x..][..tile.width] {
+                    let label = if CODED { label & NUMBER_MASK } else { label };
                     if let Some(pixels) = usize::from(label).checked_sub(1).and_then(|i| pixels.get_mut(i)) {
                         *pixels += 1;
                     }
@@ -252,7 +286,22 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         KeepRule::everything()
     }
 
-    /// Measures the surfaces of one tile and appends them to the table.
+    /// Takes the codes out of the labels of one tile; returns the classes of its surfaces.
+    fn take_classes(&mut self, tile: Tile, classes: &[SurfaceClass; CODES]) -> [SurfaceClass; MAX_SURFACES] {
+        let mut given = [SurfaceClass::Undefined; MAX_SURFACES];
+        for y in tile.y..tile.y + tile.height {
+            for label in &mut self.labels[y * self.width + tile.x..][..tile.width] {
+                let code = usize::from(*label >> CODE_SHIFT);
+                *label &= NUMBER_MASK;
+                if let Some(class) = usize::from(*label).checked_sub(1).and_then(|i| given.get_mut(i)) {
+                    *class = classes.get(code).copied().unwrap_or_default();
+                }
+            }
+        }
+        given
+    }
+
+    /// Measures the surfaces of one tile and appends them to the table, with the classes `given` for them, if any.
     fn measure<const DISPARITIES: usize>(
         &mut self,
         pixels: &[DisparityPixel],
@@ -260,6 +309,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         depth: &DepthTable<DISPARITIES>,
         rays: &Rays,
         keep: &mut KeepRule,
+        given: Option<&[SurfaceClass; MAX_SURFACES]>,
     ) {
         let stride = self.width;
         let row = |y: usize| (tile.y + y) * stride + tile.x..(tile.y + y) * stride + tile.x + tile.width;
@@ -303,7 +353,10 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         for (i, number) in renumbered.iter_mut().enumerate().take(count) {
             let moments = &self.moments[i];
             let unit_m = depth.scale_m() * (1u32 << self.shifts[i]) as f32;
-            let surface = self.classify(moments.scatter(rays, u, v, unit_m));
+            let mut surface = self.classify(moments.scatter(rays, u, v, unit_m));
+            if let Some(&class) = given.and_then(|given| given.get(i)) {
+                surface.class = class;
+            }
             if keep.keeps(moments.pixels()) && self.table.push(surface).is_ok() {
                 kept += 1;
                 *number = kept;

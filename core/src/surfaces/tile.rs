@@ -12,6 +12,13 @@ pub(super) const MIN_PIXELS: u16 = 16;
 /// Most surfaces that one tile can hold.
 pub(super) const MAX_SURFACES: usize = AREA / MIN_PIXELS as usize;
 
+/// Number of classes that a method can tell pixels apart by, before there are surfaces: two bits beside the number of a surface.
+pub(crate) const CODES: usize = 4;
+
+/// Where the class of a pixel lies beside the number of its surface, which then has the bits below.
+pub(super) const CODE_SHIFT: u32 = 6;
+pub(super) const NUMBER_MASK: u8 = (1 << CODE_SHIFT) - 1;
+
 /// Place of a tile in the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tile {
@@ -50,9 +57,12 @@ impl TileUnion {
     /// there is none; returns how many there are. `covers` says which disparities are points. Of the settings the step and
     /// the least number of pixels count here.
     ///
+    /// If `CODED`, `labels` holds a class below [`CODES`] for each pixel: only pixels of one class make a surface, and the class
+    /// is left beside the number, [`CODE_SHIFT`] bits up.
+    ///
     /// # Bound
     /// Three passes over the tile.
-    pub(super) fn label(
+    pub(super) fn label<const CODED: bool>(
         &mut self,
         picture: &[DisparityPixel],
         stride: usize,
@@ -68,6 +78,8 @@ impl TileUnion {
         for y in 0..tile.height {
             let here = row(y);
             let above = row(y.saturating_sub(1));
+            let codes = |y: usize| &labels[(tile.y + y) * stride + tile.x..][..tile.width];
+            let (codes_here, codes_above) = (codes(y), codes(y.saturating_sub(1)));
             let mut left = 0u16;
             for x in 0..tile.width {
                 let place = y * TILE + x;
@@ -75,11 +87,11 @@ impl TileUnion {
                 self.pixels[place] = 0;
                 self.parent[place] = place as u16;
                 if steps != 0 {
-                    if left != 0 && left.abs_diff(steps) <= step {
+                    if left != 0 && left.abs_diff(steps) <= step && (!CODED || codes_here[x - 1] == codes_here[x]) {
                         self.parent[place] = self.parent[place - 1];
                     }
                     let up = if y > 0 { steps_of(&above[x]) } else { 0 };
-                    if up != 0 && up.abs_diff(steps) <= step {
+                    if up != 0 && up.abs_diff(steps) <= step && (!CODED || codes_above[x] == codes_here[x]) {
                         self.join(place, place - TILE);
                     }
                 }
@@ -95,10 +107,12 @@ impl TileUnion {
             }
         }
         // The count of a surface makes room for its number as soon as the number is known.
+        let most = if CODED { usize::from(NUMBER_MASK) } else { MAX_SURFACES };
         let mut found = 0u8;
         for y in 0..tile.height {
             let labels = &mut labels[(tile.y + y) * stride + tile.x..][..tile.width];
             for ((x, pixel), label) in row(y).iter().enumerate().zip(labels) {
+                let code = *label;
                 *label = 0;
                 if steps_of(pixel) == 0 {
                     continue;
@@ -106,11 +120,14 @@ impl TileUnion {
                 let root = self.root(y * TILE + x);
                 let pixels = &mut self.pixels[root];
                 if *pixels & NUMBERED == 0 {
-                    let enough = *pixels >= min_pixels && usize::from(found) < MAX_SURFACES;
+                    let enough = *pixels >= min_pixels && usize::from(found) < most;
                     found += u8::from(enough);
                     *pixels = NUMBERED | if enough { u16::from(found) } else { 0 };
                 }
                 *label = (*pixels & !NUMBERED) as u8;
+                if CODED && *label != 0 {
+                    *label |= code << CODE_SHIFT;
+                }
             }
         }
         found

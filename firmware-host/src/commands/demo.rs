@@ -37,6 +37,7 @@ pub fn demo(args: &DemoArgs, console: &mut Console) -> Result<Ending, Failure> {
         calibration,
         mount,
         frames: options.frames as usize,
+        truth: None,
         warnings: Vec::new(),
         source: Recorder { camera: scene.into_camera(), writer },
     };

@@ -3,6 +3,7 @@
 mod cameras;
 mod can;
 mod check;
+mod compare;
 mod demo;
 mod listen;
 mod optics;
@@ -13,6 +14,7 @@ mod run;
 pub use cameras::cameras;
 pub use can::decode;
 pub use check::check;
+pub use compare::compare;
 pub use demo::demo;
 pub use listen::listen;
 pub use record::record_rig;
@@ -28,7 +30,7 @@ use crate::{
     error::{Failure, FailureKind},
     output::OutputFolder,
     pipeline::{self, Job},
-    report::PageInput,
+    report::{self, FramePainter, PageInput},
     source::{Input, Source},
     summary,
 };
@@ -69,15 +71,13 @@ fn detect_and_write<S: Source>(
         input.mount = mount;
     }
     let settings = config.settings_for(input.picture_size().0);
-    let job = Job { folder: &folder, write, settings, wire: config.wire, config };
+    let show = if write.contains(&Output::Report) { report::SHOWN } else { 0 };
+    let job = Job { folder: &folder, write, show, settings, normalized_cuts: None, wire: config.wire, config };
     console.note(format_args!("{}: {} frames, {}", input.name, input.frames, input.description));
-    let (log, report) = pipeline::run(input, &job, console, progress)?;
+    let (log, report) = pipeline::run(input, &job, FramePainter, console, progress)?;
 
     let summary = summary::summary(input, &job, &log, console.warnings());
-    let mut text = serde_json::to_string_pretty(&summary)
-        .map_err(|error| Failure::work(format!("the summary cannot be made: {error}")))?;
-    text.push('\n');
-    folder.write("summary.json", text.as_bytes())?;
+    summary::write(&folder, "summary.json", &summary)?;
     if write.contains(&Output::Report) {
         let page = report.page(&PageInput {
             name: &input.name,

@@ -37,6 +37,7 @@ const STATUS: Duration = Duration::from_secs(2);
 pub fn run(args: &RunArgs, console: &mut Console) -> Result<Ending, Failure> {
     let mut config = Config::read_rig(&args.config)?;
     config.wire.node = args.node.unwrap_or(config.wire.node);
+    config.choose(&args.methods)?;
     let wire = WireConfig::new(config.wire).map_err(|error| Failure::config(error, Some(&args.config)))?;
     let plan = plan(&config, wire, console)?;
 

@@ -218,7 +218,13 @@ impl<'a> Reader<'a> {
     }
 }
 
-impl Section<'_> {
+impl<'a> Section<'a> {
+    /// The settings `names` of the section by themselves.
+    pub(super) fn plain(&self, names: &[&str]) -> Section<'a> {
+        let table = self.table.clone().into_iter().filter(|(key, _)| names.contains(&key.get_ref().as_ref())).collect();
+        Section { table, ..self.clone() }
+    }
+
     pub(super) fn under(&self, name: &str) -> String {
         match (self.path.as_str(), name) {
             ("", name) => name.to_string(),
@@ -246,6 +252,7 @@ impl Refused {
             ConfigProblem::OverCapacity { capacity, .. } => format!("set it to {capacity} or less"),
             ConfigProblem::NotOdd => "set it to an odd number".to_string(),
             ConfigProblem::NotAMultiple { of } => format!("set it to a multiple of {of}"),
+            ConfigProblem::SameDetector => "name another detector, or leave it out".to_string(),
             _ => "correct it".to_string(),
         };
         Self { field: field.to_string(), problem: error.problem.to_string(), mend }

@@ -8,7 +8,12 @@ pub use rig::{RecordingSettings, Rig, RigPair, RigSource, SceneSettings, build_s
 
 use std::path::{Path, PathBuf};
 
-use crate::{cli::DetectorArgs, detector, error::Failure, normalized_cuts::NormalizedCutSettings};
+use crate::{
+    cli::{DetectorArgs, MethodArgs},
+    detector,
+    error::Failure,
+    normalized_cuts::NormalizedCutSettings,
+};
 use fencepost_core::{
     error::ConfigError,
     geometry::Mount,
@@ -16,6 +21,10 @@ use fencepost_core::{
     health::HealthSettings,
     map::MapSettings,
     matching::MatchSettings,
+    methods::{
+        ConfidenceSettings, CostMapSettings, DetectorKind, DisparitySegmentSettings, GroundDeviationSettings,
+        PixelNormalSettings,
+    },
     obstacles::ObstacleSettings,
     settings::Settings,
     surfaces::SurfaceSettings,
@@ -23,6 +32,7 @@ use fencepost_core::{
     wire::{FrameFormat, WireConfig, WireSettings},
 };
 use mistake::{Reader, Refused};
+use serde::Deserialize;
 
 /// Settings of the detector, of the mount and of the bus.
 #[derive(Clone, Debug, Default)]
@@ -43,8 +53,11 @@ pub struct Config {
     pub file: Option<PathBuf>,
 }
 
-/// The sections of a configuration file.
-const SECTIONS: [&str; 13] = [
+/// What stands in a configuration file before its sections.
+const CHOICE: [&str; 2] = ["detector", "cross_check"];
+
+/// ... and its sections.
+const SECTIONS: [&str; 18] = [
     "matching",
     "validate",
     "surfaces",
@@ -53,12 +66,32 @@ const SECTIONS: [&str; 13] = [
     "map",
     "health",
     "normalized_cuts",
+    "cost_map",
+    "ground_deviation",
+    "disparity_segments",
+    "pixel_normals",
+    "confidence",
     "mount",
     "wire",
     "bus",
     "run",
     "pair",
 ];
+
+/// The detector, and the one that checks it.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Choice {
+    detector: DetectorKind,
+    cross_check: Option<DetectorKind>,
+}
+
+impl Choice {
+    /// These detectors, in the default settings.
+    fn settings(self) -> Settings {
+        Settings { detector: self.detector, cross_check: self.cross_check, ..Settings::default() }
+    }
+}
 
 impl Config {
     /// Reads the file that the command line names, if it names one, and puts the command line's own settings over it.
@@ -70,6 +103,7 @@ impl Config {
             Some(path) => Self::read(path)?,
             None => Self::default(),
         };
+        config.choose(&args.methods)?;
         config.disparities = args.disparities.or(config.disparities);
         config.wire.node = args.node.unwrap_or(config.wire.node);
         if args.can_fd && config.wire.format == FrameFormat::Classic {
@@ -78,6 +112,16 @@ impl Config {
             config.wire = WireSettings { base_id, node, ..WireSettings::FD };
         }
         Ok(config)
+    }
+
+    /// Puts the detectors that the command line names over those of the file.
+    ///
+    /// # Errors
+    /// When a detector would check itself.
+    pub fn choose(&mut self, methods: &MethodArgs) -> Result<(), Failure> {
+        self.settings.detector = methods.detector.unwrap_or(self.settings.detector);
+        self.settings.cross_check = methods.cross_check.or(self.settings.cross_check);
+        self.settings.check_detectors().map_err(|error| Failure::config(error, self.file.as_deref()))
     }
 
     /// Reads a configuration file without its rig: a recording can be replayed where there is no camera.
@@ -140,7 +184,7 @@ impl Config {
     fn parse(text: &str, folder: &Path, with_rig: bool) -> (Self, Vec<Mistake>) {
         let mut reader = Reader::new(text);
         let root = reader.root();
-        reader.only(&root, &SECTIONS);
+        reader.only(&root, &[&CHOICE[..], &SECTIONS].concat());
         let checked = |check: Result<(), ConfigError>| check.err().map(Refused::of).into_iter().collect::<Vec<_>>();
         macro_rules! section {
             ($name:literal, $type:ty, $check:expr) => {
@@ -149,6 +193,8 @@ impl Config {
                     .and_then(|section| reader.settings(&section, &[], |settings: &$type| checked(($check)(settings))))
             };
         }
+        let choice = root.plain(&CHOICE);
+        let choice = reader.settings(&choice, &[], |choice: &Choice| checked(choice.settings().check_detectors()));
         let settings = Settings {
             matching: section!("matching", MatchSettings, MatchSettings::check).unwrap_or_default(),
             validate: section!("validate", ValidateSettings, ValidateSettings::check).unwrap_or_default(),
@@ -157,6 +203,19 @@ impl Config {
             obstacles: section!("obstacles", ObstacleSettings, ObstacleSettings::check).unwrap_or_default(),
             map: section!("map", MapSettings, |map: &MapSettings| map.check(detector::CELLS)).unwrap_or_default(),
             health: section!("health", HealthSettings, HealthSettings::check).unwrap_or_default(),
+            cost_map: section!("cost_map", CostMapSettings, CostMapSettings::check).unwrap_or_default(),
+            ground_deviation: section!("ground_deviation", GroundDeviationSettings, GroundDeviationSettings::check)
+                .unwrap_or_default(),
+            disparity_segments: section!(
+                "disparity_segments",
+                DisparitySegmentSettings,
+                DisparitySegmentSettings::check
+            )
+            .unwrap_or_default(),
+            pixel_normals: section!("pixel_normals", PixelNormalSettings, PixelNormalSettings::check)
+                .unwrap_or_default(),
+            confidence: section!("confidence", ConfidenceSettings, ConfidenceSettings::check).unwrap_or_default(),
+            ..choice.unwrap_or_default().settings()
         };
         let mount: Option<Mount> = section!("mount", Mount, Mount::check);
         let wire = section!("wire", WireSettings, |wire: &WireSettings| WireConfig::new(*wire).map(|_| ()))

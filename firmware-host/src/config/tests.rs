@@ -30,6 +30,30 @@ fn normalized_cuts_have_a_section() {
 }
 
 #[test]
+fn detectors_are_chosen_by_the_file_and_by_the_command_line() {
+    let text = "detector = \"cost-map\"\ncross_check = \"pixel-normals\"\n[cost_map]\nobstacle_cost = 30\n";
+    let mut config = read(text).unwrap();
+    let settings = config.settings_for(640);
+    assert_eq!((settings.detector, settings.cross_check), (DetectorKind::CostMap, Some(DetectorKind::PixelNormals)));
+    assert_eq!(settings.cost_map.obstacle_cost, 30);
+    let choose = |detector, cross_check| MethodArgs { detector, cross_check };
+    config.choose(&choose(Some(DetectorKind::GroundDeviation), None)).unwrap();
+    let settings = config.settings_for(640);
+    assert_eq!(settings.detector, DetectorKind::GroundDeviation);
+    assert_eq!(settings.cross_check, Some(DetectorKind::PixelNormals));
+    let refused = config.choose(&choose(Some(DetectorKind::PixelNormals), None)).unwrap_err();
+    assert!(refused.what.contains("cross_check is the detector itself"), "{refused}");
+
+    let unknown = read("detector = \"costmap\"\n").unwrap_err().to_string();
+    for kind in DetectorKind::ALL {
+        assert!(unknown.contains(kind.name()), "{unknown}");
+    }
+    let itself = read("detector = \"cost-map\"\ncross_check = \"cost-map\"\n").unwrap_err();
+    assert!(itself.place.as_ref().is_some_and(|place| place.ends_with("line 2")), "{itself}");
+    assert_eq!(read("detektor = \"cost-map\"\n").unwrap_err().mend.as_deref(), Some("write `detector`"));
+}
+
+#[test]
 fn what_is_not_set_keeps_its_default() {
     let config = read("[surfaces]\nhorizontal_deg = 25.0\n[wire]\nnode = 3\n").unwrap();
     let settings = config.settings_for(512);
@@ -49,8 +73,8 @@ fn every_setting_is_documented_with_its_default() {
             continue;
         }
         let (name, value) = line.split_once(" = ").unwrap();
-        let name = format!("`{section}.{name}`");
-        let row = documented.lines().find(|row| row.contains(&name));
+        let name = if section.is_empty() { format!("`{name}`") } else { format!("`{section}.{name}`") };
+        let row = documented.lines().filter(|row| row.starts_with('|')).find(|row| row.contains(&name));
         let row = row.unwrap_or_else(|| panic!("{name} is not in docs/files.md"));
         let value = value.trim_end_matches(".0");
         // The number of disparities follows the width of the pictures.

@@ -3,6 +3,7 @@
 use fencepost_core::{
     ground::GroundPlane,
     map::{Cell, CellState, MapGeometry},
+    methods::DetectorKind,
     obstacles::Obstacle,
 };
 
@@ -26,7 +27,8 @@ pub struct Tables {
     ground: csv::Writer<WriteFile>,
 }
 
-const CELLS: [&str; 7] = ["frame", "timestamp_ns", "x_m", "y_m", "state", "pixels", "height_m"];
+const CELLS: [&str; 10] =
+    ["frame", "timestamp_ns", "x_m", "y_m", "state", "pixels", "height_m", "confidence_percent", "doubt", "cost"];
 const OBSTACLES: [&str; 16] = [
     "frame",
     "timestamp_ns",
@@ -95,12 +97,13 @@ impl Tables {
     }
 }
 
-fn cell_fields(view: &FrameView<'_>, geometry: &MapGeometry, row: &CellRow) -> Option<[String; 7]> {
+fn cell_fields(view: &FrameView<'_>, geometry: &MapGeometry, row: &CellRow) -> Option<[String; 10]> {
     let state = match row.content.state {
         CellState::Obstacle => "obstacle",
         CellState::Free => "free",
         CellState::Unknown(_) => return None,
     };
+    let has_cost = view.detection.detectors.main() == DetectorKind::CostMap;
     // From whole millimetres, so that the centre is written exactly: (i + 1/2) * size.
     let centre = |cell: i16| f64::from((2 * i32::from(cell) + 1) * i32::from(geometry.cell_size_mm)) / 2000.0;
     Some([
@@ -111,6 +114,9 @@ fn cell_fields(view: &FrameView<'_>, geometry: &MapGeometry, row: &CellRow) -> O
         state.to_string(),
         row.content.pixels.to_string(),
         format!("{}.{}", row.content.height_dm / 10, row.content.height_dm % 10),
+        row.content.confidence_percent.to_string(),
+        words::doubt_name(row.content.doubt).to_string(),
+        if has_cost { row.content.cost.to_string() } else { String::new() },
     ])
 }
 
@@ -191,6 +197,8 @@ fn flush(writer: &mut csv::Writer<WriteFile>) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
+    use fencepost_core::{map::Doubt, methods::Detectors};
+
     use super::*;
     use crate::view::testing::MadeUp;
 
@@ -205,18 +213,19 @@ mod tests {
         let folder = OutputFolder::open(scratch.path()).unwrap();
         let mut tables = Tables::create(&folder).unwrap();
         let made_up = MadeUp::new();
-        let obstacle = Cell { state: CellState::Obstacle, pixels: 321, height_dm: 17 };
-        let free = Cell { state: CellState::Free, pixels: 12, height_dm: 0 };
+        let known = Cell { confidence_percent: 100, ..Cell::default() };
+        let doubt = Doubt::Disputed;
+        let obstacle =
+            Cell { state: CellState::Obstacle, pixels: 321, height_dm: 17, confidence_percent: 50, doubt, ..known };
+        let free = Cell { state: CellState::Free, pixels: 12, ..known };
         let rows = [CellRow { cell: (9, -1), content: obstacle }, CellRow { cell: (3, 4), content: free }];
         made_up.view(|view| tables.frame(view, &rows)).unwrap();
 
         // Read while the tables are still open: what was written stays readable whatever comes.
         let cells = read(&folder, "cells.csv");
-        assert_eq!(
-            cells[0],
-            csv::StringRecord::from(&["7", "1500000000", "4.75", "-0.25", "obstacle", "321", "1.7"][..])
-        );
-        assert_eq!(cells[1], csv::StringRecord::from(&["7", "1500000000", "1.75", "2.25", "free", "12", "0.0"][..]));
+        let row = |index: usize| cells[index].iter().collect::<Vec<_>>().join(",");
+        assert_eq!(row(0), "7,1500000000,4.75,-0.25,obstacle,321,1.7,50,disputed,");
+        assert_eq!(row(1), "7,1500000000,1.75,2.25,free,12,0.0,100,,");
         assert_eq!(read(&folder, "obstacles.csv").len(), made_up.detection.obstacles.len());
         let ground = read(&folder, "ground.csv");
         assert_eq!(
@@ -224,5 +233,19 @@ mod tests {
             ["7", "1500000000", "seen", "1.0200", "15.0000", "0.5000"]
         );
         assert_eq!(ground[0].iter().skip(13).collect::<Vec<_>>(), ["degraded", "low_coverage exposure_mismatch"]);
+    }
+
+    #[test]
+    fn only_a_cost_map_has_costs() {
+        for (kind, expected) in [(DetectorKind::CostMap, "17"), (DetectorKind::PixelNormals, "")] {
+            let scratch = tempfile::tempdir().unwrap();
+            let folder = OutputFolder::open(scratch.path()).unwrap();
+            let mut tables = Tables::create(&folder).unwrap();
+            let mut made_up = MadeUp::new();
+            made_up.detection.detectors = Detectors::new(kind, None);
+            let content = Cell { state: CellState::Obstacle, cost: 17, ..Cell::default() };
+            made_up.view(|view| tables.frame(view, &[CellRow { cell: (1, 1), content }])).unwrap();
+            assert_eq!(read(&folder, "cells.csv")[0].iter().next_back(), Some(expected), "{}", kind.name());
+        }
     }
 }

@@ -7,9 +7,16 @@ use embedded_graphics::{
     primitives::{Circle, Line, PointsIter, PrimitiveStyle, Rectangle, Triangle},
     text::{Alignment, Baseline, Text, TextStyle, TextStyleBuilder},
 };
-use fencepost_core::map::{CellState, MapGeometry, UnknownReason};
+use fencepost_core::{
+    map::{Cell, CellState, Doubt, MapGeometry, UnknownReason},
+    methods::{DetectorKind, Detectors},
+};
+use fencepost_hal::scene::TruthCell;
 
-use super::{Canvas, colours::Colour};
+use super::{
+    Canvas,
+    colours::{Colour, mix},
+};
 use crate::{view::FrameView, words};
 
 const PAPER: Colour = [255, 255, 255];
@@ -21,6 +28,13 @@ const DOT: Colour = [186, 24, 22];
 const INK: Colour = [40, 42, 48];
 const GRID: Colour = [178, 182, 190];
 const VIEW: Colour = [36, 84, 170];
+const DISPUTED: Colour = [226, 124, 0];
+const UNCONFIRMED: Colour = [238, 196, 120];
+/// Cells by their cost, from none to the most: the paper, Figure 7, where lighter is costlier.
+const NO_COST: Colour = [44, 48, 58];
+const MOST_COST: Colour = [252, 250, 240];
+/// Cost that is as light as can be. Costs differ by orders of magnitude, as numbers of pixels do: light goes by their logarithm.
+const LIGHTEST: f32 = 2000.0;
 
 /// Longest edge of the map itself, px.
 const LONGEST_PX: f32 = 500.0;
@@ -28,20 +42,68 @@ const LEFT_PX: i32 = 58;
 const TOP_PX: i32 = 34;
 const RIGHT_PX: i32 = 22;
 const BOTTOM_PX: i32 = 76;
+/// A second row of the legend.
+const LEGEND_ROW_PX: i32 = 18;
 /// Metres from one line of the grid to the next.
 const GRID_M: i32 = 5;
 
 /// Paints the map of a frame.
 pub fn birdseye(view: &FrameView<'_>) -> Canvas {
+    let reasons = words::reason_names(view.health, ", ");
+    let level = words::level_name(view.health.level);
+    let title = match reasons.is_empty() {
+        true => format!("frame {}   health {level}", view.number),
+        false => format!("frame {}   health {level}: {reasons}", view.number),
+    };
+    paint(view, &title, &legend(view.detection.detectors))
+}
+
+/// Paints what is really in the cells of a frame, in the same manner. `truth(i, j)` is told of cell `(i, j)`.
+pub fn true_map(view: &FrameView<'_>, truth: impl Fn(i16, i16) -> TruthCell) -> Canvas {
+    let mut detection = Box::new(view.detection.clone());
+    detection.obstacles.clear();
+    // Neither costs nor doubts are painted.
+    detection.detectors = Detectors::default();
+    let geometry = detection.map.geometry;
+    for (index, cell) in detection.map.cells.iter_mut().enumerate() {
+        let (i, j) = geometry.cell_at(index);
+        let state = match truth(i, j) {
+            TruthCell::Obstacle => CellState::Obstacle,
+            TruthCell::Free => CellState::Free,
+            TruthCell::NotJudged => CellState::Unknown(UnknownReason::OutsideView),
+        };
+        *cell = Cell { state, ..Cell::default() };
+    }
+    let legend = [
+        Entry { dot: true, ..Entry::plain(OBSTACLE, "obstacle") },
+        Entry::plain(FREE, "free"),
+        Entry::plain(UNKNOWN, "not judged"),
+    ];
+    paint(&FrameView { detection: &detection, ..*view }, &format!("frame {}   truth", view.number), &legend)
+}
+
+/// Marks cells of a map that [`birdseye`] painted with a frame of a colour.
+pub fn mark_cells(canvas: &mut Canvas, geometry: MapGeometry, cells: impl IntoIterator<Item = ((i16, i16), Colour)>) {
+    let scale = Scale::new(geometry);
+    for ((i, j), colour) in cells {
+        let Some(index) = geometry.index(i, j) else { continue };
+        let size = Size::new(scale.px_per_cell.unsigned_abs() + 1, scale.px_per_cell.unsigned_abs() + 1);
+        let style = PrimitiveStyle::with_stroke(rgb(colour), if scale.px_per_cell >= 8 { 2 } else { 1 });
+        draw(&Rectangle::new(scale.cell(index), size).into_styled(style), canvas);
+    }
+}
+
+fn paint(view: &FrameView<'_>, title: &str, legend: &[Entry]) -> Canvas {
     let scale = Scale::new(view.detection.map.geometry);
     let (width, height) = scale.canvas_px();
-    let mut canvas = Canvas::new(width, height, PAPER);
+    let more = if legend.len() > LEGEND_ROW { LEGEND_ROW_PX as usize } else { 0 };
+    let mut canvas = Canvas::new(width, height + more, PAPER);
     paint_cells(&mut canvas, &scale, view);
     paint_grid(&mut canvas, &scale);
     paint_field_of_view(&mut canvas, &scale, view);
     paint_obstacles(&mut canvas, &scale, view);
     paint_robot(&mut canvas, &scale);
-    paint_words(&mut canvas, &scale, view);
+    paint_words(&mut canvas, &scale, title, legend);
     canvas
 }
 
@@ -106,18 +168,22 @@ impl Scale {
 }
 
 fn paint_cells(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
+    let has_cost = view.detection.detectors.main() == DetectorKind::CostMap;
     for (index, cell) in view.detection.map.cells.iter().enumerate() {
         let at = scale.cell(index);
+        let frame = match cell.doubt {
+            Doubt::None => None,
+            Doubt::Unconfirmed => Some(UNCONFIRMED),
+            Doubt::Disputed => Some(DISPUTED),
+        };
         for dy in 0..scale.px_per_cell {
             for dx in 0..scale.px_per_cell {
                 let (x, y) = (at.x + dx, at.y + dy);
-                let colour = match cell.state {
-                    CellState::Free => FREE,
-                    CellState::Obstacle => OBSTACLE,
-                    CellState::Unknown(UnknownReason::OutsideView) => UNKNOWN,
-                    CellState::Unknown(_) => [UNKNOWN, HATCH][usize::from((x + y).rem_euclid(6) == 0)],
-                };
-                canvas.set(x, y, colour);
+                let [nearest, farthest] = [dx.min(dy), dx.max(dy)];
+                let at_edge = nearest == 0 || farthest == scale.px_per_cell - 1;
+                let colour = if has_cost { cost_colour(cell) } else { None };
+                let colour = colour.unwrap_or_else(|| state_colour(cell.state, x, y));
+                canvas.set(x, y, frame.filter(|_| at_edge).unwrap_or(colour));
             }
         }
         if cell.state == CellState::Obstacle {
@@ -126,6 +192,21 @@ fn paint_cells(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
             draw(&Circle::with_center(centre, diameter).into_styled(PrimitiveStyle::with_fill(rgb(DOT))), canvas);
         }
     }
+}
+
+fn state_colour(state: CellState, x: i32, y: i32) -> Colour {
+    match state {
+        CellState::Free => FREE,
+        CellState::Obstacle => OBSTACLE,
+        CellState::Unknown(UnknownReason::OutsideView) => UNKNOWN,
+        CellState::Unknown(_) => [UNKNOWN, HATCH][usize::from((x + y).rem_euclid(6) == 0)],
+    }
+}
+
+/// Colour of a cell by its cost; `None` where nothing is known of it.
+fn cost_colour(cell: &Cell) -> Option<Colour> {
+    let known = cell.cost > 0 || !matches!(cell.state, CellState::Unknown(_));
+    known.then(|| mix(NO_COST, MOST_COST, ((1.0 + f32::from(cell.cost)).ln() / LIGHTEST.ln()).min(1.0)))
 }
 
 fn paint_grid(canvas: &mut Canvas, scale: &Scale) {
@@ -197,19 +278,12 @@ fn paint_robot(canvas: &mut Canvas, scale: &Scale) {
     draw(&robot.into_styled(PrimitiveStyle::with_fill(rgb(INK))), canvas);
 }
 
-fn paint_words(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
+fn paint_words(canvas: &mut Canvas, scale: &Scale, title: &str, legend: &[Entry]) {
     let plain = MonoTextStyle::new(&FONT_8X13, rgb(INK));
     let bold = MonoTextStyle::new(&FONT_8X13_BOLD, rgb(INK));
     let left_top = text_style(Alignment::Left, Baseline::Top);
     let (width, height) = scale.map_px();
 
-    let health = view.health;
-    let reasons = words::reason_names(health, ", ");
-    let level = words::level_name(health.level);
-    let title = match reasons.is_empty() {
-        true => format!("frame {}   health {level}", view.number),
-        false => format!("frame {}   health {level}: {reasons}", view.number),
-    };
     let room = (canvas.width() as i32 - 16) / 8;
     let title: String = title.chars().take(room.max(0) as usize).collect();
     draw(&Text::with_text_style(&title, Point::new(8, 10), bold, left_top), canvas);
@@ -218,36 +292,63 @@ fn paint_words(canvas: &mut Canvas, scale: &Scale, view: &FrameView<'_>) {
     let axis = "y, metres to the left";
     draw(&Text::with_text_style(axis, Point::new(LEFT_PX + width / 2, TOP_PX + height + 24), plain, middle), canvas);
     draw_upward(canvas, "x, metres ahead", Point::new(6, TOP_PX + height / 2));
-    paint_legend(canvas, TOP_PX + height + 50);
+    for (entries, row) in legend.chunks(LEGEND_ROW).zip(0..) {
+        paint_legend(canvas, TOP_PX + height + 50 + row * LEGEND_ROW_PX, entries);
+    }
 }
 
-fn paint_legend(canvas: &mut Canvas, y: i32) {
+/// Entries in a row of the legend.
+const LEGEND_ROW: usize = 4;
+
+/// A word of the legend, and what its patch looks like.
+struct Entry {
+    colour: Colour,
+    word: &'static str,
+    hatched: bool,
+    dot: bool,
+    frame: Colour,
+}
+
+impl Entry {
+    const fn plain(colour: Colour, word: &'static str) -> Self {
+        Self { colour, word, hatched: false, dot: false, frame: INK }
+    }
+}
+
+/// What the map shows, in rows of [`LEGEND_ROW`].
+fn legend(detectors: Detectors) -> Vec<Entry> {
+    let has_cost = detectors.main() == DetectorKind::CostMap;
+    let (obstacle, free) = if has_cost { (MOST_COST, NO_COST) } else { (OBSTACLE, FREE) };
+    let mut entries = vec![
+        Entry { dot: true, ..Entry::plain(obstacle, "obstacle") },
+        Entry::plain(free, "free"),
+        Entry { hatched: true, ..Entry::plain(UNKNOWN, "not known") },
+        Entry::plain(UNKNOWN, "out of view"),
+    ];
+    if has_cost {
+        entries.push(Entry::plain(mix(NO_COST, MOST_COST, 0.6), "lighter: costlier"));
+    }
+    if detectors.cross_check().is_some() {
+        entries.push(Entry { frame: DISPUTED, ..Entry::plain(PAPER, "disputed") });
+        entries.push(Entry { frame: UNCONFIRMED, ..Entry::plain(PAPER, "unconfirmed") });
+    }
+    entries
+}
+
+fn paint_legend(canvas: &mut Canvas, y: i32, entries: &[Entry]) {
     let plain = MonoTextStyle::new(&FONT_8X13, rgb(INK));
     let mut x = 12;
-    for (colour, hatched, word) in [
-        (OBSTACLE, false, "obstacle"),
-        (FREE, false, "free"),
-        (UNKNOWN, true, "not known"),
-        (UNKNOWN, false, "out of view"),
-    ] {
+    for Entry { colour, word, hatched, dot, frame } in entries {
         for dy in 0..13 {
             for dx in 0..13 {
-                let edge = dx == 0 || dy == 0 || dx == 12 || dy == 12;
-                let line = hatched && (x + dx + y + dy).rem_euclid(6) == 0;
-                canvas.set(
-                    x + dx,
-                    y + dy,
-                    if edge {
-                        INK
-                    } else if line {
-                        HATCH
-                    } else {
-                        colour
-                    },
-                );
+                let thick = if *frame == INK { 0 } else { 1 };
+                let edge = dx.min(dy) <= thick || dx.max(dy) >= 12 - thick;
+                let line = *hatched && (x + dx + y + dy).rem_euclid(6) == 0;
+                let inner = if line { HATCH } else { *colour };
+                canvas.set(x + dx, y + dy, if edge { *frame } else { inner });
             }
         }
-        if word == "obstacle" {
+        if *dot {
             let dot = Circle::new(Point::new(x + 3, y + 3), 7);
             draw(&dot.into_styled(PrimitiveStyle::with_fill(rgb(DOT))), canvas);
         }
@@ -302,6 +403,51 @@ mod tests {
                 assert_ne!(colour, DOT, "cell ({i}, {j})");
             }
         }
+    }
+
+    #[test]
+    fn the_truth_is_painted_in_place_of_what_was_found() {
+        let made_up = MadeUp::new();
+        let truth = |i: i16, j: i16| if (i, j) == (20, 3) { TruthCell::Obstacle } else { TruthCell::Free };
+        let canvas = made_up.view(|view| true_map(view, truth));
+        let scale = Scale::new(made_up.detection.map.geometry);
+        let dot_at = |i: i16, j: i16| {
+            let (x_m, y_m) = made_up.detection.map.geometry.centre_m(i, j);
+            let at = scale.point(x_m, y_m);
+            canvas.get(at.x as usize, at.y as usize) == DOT
+        };
+        assert!(dot_at(20, 3), "the obstacle of the truth");
+        assert!(!dot_at(9, 1), "what the detector found");
+    }
+
+    #[test]
+    fn doubt_has_a_frame_and_costs_are_lighter_the_higher_they_are() {
+        let mut made_up = MadeUp::new();
+        let geometry = made_up.detection.map.geometry;
+        let doubts = [(5, Doubt::Disputed, DISPUTED), (6, Doubt::Unconfirmed, UNCONFIRMED)];
+        for (i, doubt, _) in doubts {
+            made_up.detection.map.cells[geometry.index(i, 0).unwrap()].doubt = doubt;
+        }
+        let scale = Scale::new(geometry);
+        let canvas = made_up.view(birdseye);
+        for (i, _, colour) in doubts {
+            let at = scale.cell(geometry.index(i, 0).unwrap());
+            // The lines of the grid lie over the cells' edges; this pixel is beside one.
+            assert_eq!(canvas.get(at.x as usize + 1, at.y as usize), colour, "cell ({i}, 0)");
+        }
+
+        made_up.detection.detectors = Detectors::new(DetectorKind::CostMap, None);
+        for (i, cost) in [(5, 0), (6, 1), (7, 30), (8, 3000)] {
+            let cell = &mut made_up.detection.map.cells[geometry.index(i, 3).unwrap()];
+            *cell = Cell { state: CellState::Free, cost, ..Cell::default() };
+        }
+        let canvas = made_up.view(birdseye);
+        let light = [5, 6, 7, 8].map(|i| {
+            let at = scale.cell(geometry.index(i, 3).unwrap());
+            canvas.get(at.x as usize + 3, at.y as usize + 3)
+        });
+        assert_eq!((light[0], light[3]), (NO_COST, MOST_COST));
+        assert!(light.is_sorted_by(|a, b| (0..3).all(|i| a[i] < b[i])), "{light:?}");
     }
 
     #[test]

@@ -11,6 +11,12 @@ pub const NO_VALUE: Colour = [84, 14, 20];
 pub const GROUND: Colour = [226, 44, 42];
 /// Obstacles over the left picture; the paper, Figure 11 (g).
 pub const OBSTACLE: Colour = [36, 92, 240];
+/// Cells that hold an obstacle that was not reported.
+pub const MISSED: Colour = [20, 96, 214];
+/// Cells that hold an obstacle and are reported free.
+pub const CALLED_FREE: Colour = [196, 0, 196];
+/// Cells that are reported as obstacles where there is none.
+pub const NOT_THERE: Colour = [240, 140, 0];
 /// Pixels of surfaces that a picture does not show.
 pub(super) const HIDDEN: Colour = [30, 32, 36];
 

@@ -1,9 +1,17 @@
 //! The figures of one frame.
 
-use base64::{Engine, prelude::BASE64_STANDARD};
-use fencepost_core::{disparity::Reason, geometry::RectifiedPair, obstacles::Obstacle, settings::Settings};
+use std::borrow::Cow;
+
+use fencepost_core::{
+    disparity::Reason,
+    geometry::RectifiedPair,
+    methods::{DetectorKind, Detectors},
+    obstacles::Obstacle,
+    settings::Settings,
+};
 use serde::Serialize;
 
+use super::{Embedded, Painter};
 use crate::{
     paint::{self, Canvas, Figures, birdseye, reason_colour, value_colour},
     view::FrameView,
@@ -35,10 +43,9 @@ pub struct ReportFrame {
 struct Figure {
     letter: &'static str,
     title: &'static str,
-    caption: &'static str,
-    width: usize,
-    height: usize,
-    uri: String,
+    caption: Cow<'static, str>,
+    #[serde(flatten)]
+    picture: Embedded,
 }
 
 /// A mark on the scale of the disparity picture.
@@ -67,6 +74,18 @@ struct ObstacleRow {
     pixels: u32,
 }
 
+/// Paints the figures of a frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FramePainter;
+
+impl Painter for FramePainter {
+    type Painted = ReportFrame;
+
+    fn paint(&self, view: &FrameView<'_>, settings: &Settings) -> ReportFrame {
+        ReportFrame::paint(view, settings)
+    }
+}
+
 impl ReportFrame {
     /// Most obstacles listed.
     const LISTED: usize = 8;
@@ -89,7 +108,7 @@ impl ReportFrame {
             health: words::level_name(view.health.level),
             health_words: words::reasons_in_words(view.health),
             figures: camera_figures(&figures),
-            map: figure("h", "Bird’s-eye map", MAP_CAPTION, &birdseye(view)),
+            map: figure("h", "Bird’s-eye map", map_caption(view.detection.detectors), &birdseye(view)),
             scale: scale(view.pair, figures.scale_px),
             reasons: Reason::ALL.map(share).into(),
             seen_percent: percent(statistics.pixels_with_disparity),
@@ -111,6 +130,22 @@ impl ReportFrame {
 const MAP_CAPTION: &str = "The robot stands at (0, 0) and looks up. Red dots are obstacle cells, light cells are free \
     ground, hatched cells are in view but not known, grey ones are out of view. Strokes show how long each obstacle is and \
     how it lies; the dashed lines bound the view of the left camera.";
+
+/// The caption of the map, with what is special about the detectors.
+fn map_caption(detectors: Detectors) -> String {
+    let mut caption = MAP_CAPTION.to_string();
+    if detectors.main() == DetectorKind::CostMap {
+        caption.push_str(" The lighter a cell, the higher its cost: the number of points above its ground.");
+    }
+    if let Some(check) = detectors.cross_check() {
+        caption.push_str(&format!(
+            " Cells framed in orange are disputed: {} says the opposite, and what it calls an obstacle is not free; those framed in \
+             light orange it does not know.",
+            check.name()
+        ));
+    }
+    caption
+}
 
 fn camera_figures(figures: &Figures<'_>) -> Vec<Figure> {
     vec![
@@ -155,17 +190,8 @@ fn camera_figures(figures: &Figures<'_>) -> Vec<Figure> {
     ]
 }
 
-fn figure(letter: &'static str, title: &'static str, caption: &'static str, canvas: &Canvas) -> Figure {
-    let thinned = canvas.thinned(canvas.width().div_ceil(WIDEST));
-    let png = thinned.small_png();
-    Figure {
-        letter,
-        title,
-        caption,
-        width: thinned.width(),
-        height: thinned.height(),
-        uri: format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png)),
-    }
+fn figure(letter: &'static str, title: &'static str, caption: impl Into<Cow<'static, str>>, canvas: &Canvas) -> Figure {
+    Figure { letter, title, caption: caption.into(), picture: Embedded::new(canvas, WIDEST) }
 }
 
 /// The disparities between which 98 of 100 pixels lie: the whole range searched would leave most pictures dark.

@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::{
     ReportFrame,
     charts::{Chart, Series},
-    tables::{self, HealthRow, Setting, StageRow, StripPart},
+    tables::{self, HealthRow, ScoreTable, Setting, StageRow, StripPart},
 };
 use crate::{
     console::WarningCount,
@@ -22,6 +22,8 @@ use crate::{
 };
 
 const TEMPLATE: &str = include_str!("report.html");
+/// The look of every page.
+const STYLE: &str = include_str!("style.css");
 
 /// Everything that the page says besides the figures.
 #[derive(Debug)]
@@ -57,6 +59,7 @@ struct Page<'a> {
     obstacle_colour: String,
     ground_charts: Vec<ChartOnPage>,
     map_charts: Vec<ChartOnPage>,
+    scores: Vec<ScoreTable>,
     stages: Vec<StageRow>,
     time_chart: String,
     strip: Vec<StripPart>,
@@ -82,11 +85,6 @@ struct ChartOnPage {
 }
 
 pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<String, Failure> {
-    let mut environment = Environment::new();
-    // The name ends in `.html`, so everything that is put in is escaped.
-    let wrong =
-        |error: minijinja::Error| Failure::work(format!("the report cannot be made: {error:#}")).at("report.html");
-    environment.add_template("report.html", TEMPLATE).map_err(wrong)?;
     let records = &input.log.frames;
     // One frame makes no course of time.
     let course = if records.len() > 1 { records.as_slice() } else { &[] };
@@ -103,6 +101,7 @@ pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<St
         obstacle_colour: paint::hex(paint::OBSTACLE),
         ground_charts: ground_charts(course, input.mount),
         map_charts: map_charts(course),
+        scores: tables::scores(input.log),
         stages: tables::stage_rows(&summary::stage_times(records)),
         time_chart: time_chart(course),
         strip: tables::strip(input.log),
@@ -112,9 +111,19 @@ pub(super) fn render(frames: &[ReportFrame], input: &PageInput<'_>) -> Result<St
         calibration: tables::calibration(input.calibration),
         mount: summary::mount_words(input.mount),
     };
+    fill(TEMPLATE, page)
+}
+
+/// Fills a template with what it is given; `style.css` is there to be included.
+pub(crate) fn fill(template: &str, given: impl Serialize) -> Result<String, Failure> {
+    let wrong =
+        |error: minijinja::Error| Failure::work(format!("the report cannot be made: {error:#}")).at("report.html");
+    let mut environment = Environment::new();
+    environment.add_template("style.css", STYLE).map_err(wrong)?;
+    // The name ends in `.html`, so everything that is put in is escaped.
     environment
-        .get_template("report.html")
-        .and_then(|template| template.render(minijinja::Value::from(minijinja::value::Serde(page))))
+        .template_from_named_str("report.html", template)
+        .and_then(|template| template.render(minijinja::Value::from(minijinja::value::Serde(given))))
         .map_err(wrong)
 }
 

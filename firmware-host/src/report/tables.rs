@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::{
     pipeline::Log,
+    score::{CELL_FIGURES, DISPARITY_FIGURES, Figure},
     summary::{self, StageTimes},
     words,
 };
@@ -42,6 +43,44 @@ pub(super) struct StripPart {
 pub(super) struct Setting {
     name: String,
     value: String,
+}
+
+/// A score on the page.
+#[derive(Serialize)]
+pub(super) struct ScoreTable {
+    title: &'static str,
+    basis: String,
+    rows: Vec<ScoreRow>,
+}
+
+#[derive(Serialize)]
+struct ScoreRow {
+    title: &'static str,
+    words: &'static str,
+    value: String,
+}
+
+/// What the run is worth; empty without truth.
+pub(super) fn scores(log: &Log) -> Vec<ScoreTable> {
+    fn rows<S>(figures: &[Figure<S>], score: &S) -> Vec<ScoreRow> {
+        let row = |f: &Figure<S>| ScoreRow { title: f.title, words: f.words, value: f.text(score) };
+        figures.iter().map(row).collect()
+    }
+    let scores = log.scores.clone().unwrap_or_default();
+    let cells = scores.cells.map(|score| ScoreTable {
+        title: "Cells against lidar",
+        basis: format!(
+            "{} obstacle cells and {} free ones in {} frames",
+            score.truth_obstacle_cells, score.truth_free_cells, score.frames
+        ),
+        rows: rows(&CELL_FIGURES, &score),
+    });
+    let disparity = scores.disparity.map(|score| ScoreTable {
+        title: "Disparity against truth",
+        basis: format!("{} pixels with truth", score.pixels),
+        rows: rows(&DISPARITY_FIGURES, &score),
+    });
+    cells.into_iter().chain(disparity).collect()
 }
 
 pub(super) fn stage_rows(stages: &[StageTimes]) -> Vec<StageRow> {

@@ -25,14 +25,27 @@ pub(crate) fn fencepost() -> Command {
     command
 }
 
+/// The scene of the rendered recording.
+pub(crate) fn scene_options() -> SceneOptions {
+    SceneOptions { width: 160, height: 120, focal_px: 130.0, frames: FRAMES, ..SceneOptions::default() }
+}
+
+/// Adds the true disparity to a copy of the rendered recording.
+pub(crate) fn add_true_disparity(recording: &Path) {
+    let scene = Scene::new(scene_options()).unwrap();
+    fs::create_dir(recording.join("disp_occ_0")).unwrap();
+    for frame in 0..FRAMES {
+        let png = fencepost::paint::grey16_png(160, 120, &scene.truth(frame).disparity);
+        fs::write(recording.join(format!("disp_occ_0/{frame:06}.png")), png).unwrap();
+    }
+}
+
 /// A fresh copy of a rendered recording in KITTI's layout, 160 x 120 px, to be damaged.
 pub(crate) fn recording() -> TempDir {
     static RENDERED: OnceLock<TempDir> = OnceLock::new();
     let rendered = RENDERED.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
-        let options =
-            SceneOptions { width: 160, height: 120, focal_px: 130.0, frames: FRAMES, ..SceneOptions::default() };
-        let scene = Scene::new(options).unwrap();
+        let scene = Scene::new(scene_options()).unwrap();
         let path = folder.path().join("recording");
         let mut writer = RecordingWriter::create(&path, &scene.calibration(), &scene.mount()).unwrap();
         let mut camera = scene.into_camera();
@@ -70,9 +83,18 @@ pub(crate) struct Run {
 
 /// Replays a recording with more arguments.
 pub(crate) fn replay(recording: &Path, arguments: &[&str]) -> Run {
+    run("replay", recording, arguments)
+}
+
+/// Compares detectors on a recording with more arguments.
+pub(crate) fn compare(recording: &Path, arguments: &[&str]) -> Run {
+    run("compare", recording, arguments)
+}
+
+fn run(command: &str, recording: &Path, arguments: &[&str]) -> Run {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let output = fencepost().arg("replay").arg(recording).arg("--out").arg(&out).args(arguments).output().unwrap();
+    let output = fencepost().arg(command).arg(recording).arg("--out").arg(&out).args(arguments).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let run = Run {
         status: output.status.code().unwrap_or(-1),
@@ -101,7 +123,12 @@ impl Run {
 
     /// `summary.json`.
     pub(crate) fn summary(&self) -> serde_json::Value {
-        serde_json::from_str(&fs::read_to_string(self.out.join("summary.json")).unwrap()).unwrap()
+        self.json("summary.json")
+    }
+
+    /// A file with JSON.
+    pub(crate) fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_str(&fs::read_to_string(self.out.join(name)).unwrap()).unwrap()
     }
 
     /// Asserts on exit status and on what stderr says; `says` are parts that must be there.

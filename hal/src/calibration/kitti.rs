@@ -15,13 +15,14 @@ pub(super) fn parse(
     warnings: &mut Vec<CalibrationWarning>,
 ) -> Result<RectifiedPair, CalibrationError> {
     let fields = ["P0", "P1"];
-    let [left, right] = fields.map(|field| projection(file, text, field));
+    let [left, right] = fields.map(|field| matrix(file, text, field));
     let place = pair::Place { file, field: "picture size" };
     let size = pair::size_or_pictures(place, None, pictures);
     pair::rectified(file, fields, [left?, right?], size?, warnings)
 }
 
-fn projection(file: &Path, text: &str, field: &str) -> Result<[f64; 12], CalibrationError> {
+/// The 3 x 4 matrix of the line `FIELD: values`, row by row.
+pub(super) fn matrix(file: &Path, text: &str, field: &str) -> Result<[f64; 12], CalibrationError> {
     let error = |problem| CalibrationError::new(file, field, problem);
     let line = text.lines().find_map(|line| line.trim_start().strip_prefix(field)?.trim_start().strip_prefix(':'));
     let words = line.ok_or_else(|| error(CalibrationProblem::Missing))?.split_whitespace();

@@ -11,6 +11,7 @@ mod document;
 mod error;
 mod euroc;
 mod kitti;
+mod lidar;
 mod opencv;
 mod pair;
 mod ros;
@@ -20,6 +21,7 @@ use std::path::{Path, PathBuf};
 use fencepost_core::geometry::StereoCalibration;
 
 pub use error::{CalibrationError, CalibrationProblem, CalibrationWarning};
+pub use lidar::LidarCalibration;
 
 use document::{Document, Node};
 

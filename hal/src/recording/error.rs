@@ -81,6 +81,15 @@ pub enum RecordingError {
         /// Size in the calibration, px.
         calibration: (u32, u32),
     },
+    /// Truth of this frame, a sweep or a disparity picture, cannot be used.
+    BadTruth {
+        /// The frame.
+        frame: u32,
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and the mend.
+        problem: String,
+    },
     /// What is to be written does not fit the recording.
     Unwritable {
         /// The folder of the recording.
@@ -185,6 +194,7 @@ impl RecordingError {
             Self::MissingPicture { frame, .. }
             | Self::BadPicture { frame, .. }
             | Self::SizesDiffer { frame, .. }
+            | Self::BadTruth { frame, .. }
             | Self::SizeDiffersFromCalibration { frame, .. } => Some(*frame),
             _ => None,
         }
@@ -239,6 +249,7 @@ impl fmt::Display for RecordingError {
                  size",
                 path.display()
             ),
+            Self::BadTruth { frame, path, problem } => write!(f, "frame {frame}: {}: {problem}", path.display()),
             Self::Unwritable { folder, problem } => write!(f, "{}: {problem}", folder.display()),
         }
     }

@@ -4,6 +4,7 @@
 //! KITTI   image_0/NNNNNN.png left, image_1/ right, calib.txt, times.txt
 //! EuRoC   mav0/cam0 left, mav0/cam1 right, each with data/*.png, data.csv, sensor.yaml
 //! both    mount.json: height_m, pitch_down_deg, roll_deg of the left camera
+//! truth   disp_occ_0/NNNNNN.png disparity, velodyne/NNNNNN.bin lidar sweeps with Tr in calib.txt; either may be absent
 //! ```
 //!
 //! Pictures in KITTI's layout with the files of OpenCV or ROS in place of `calib.txt` are taken as raw.
@@ -14,6 +15,7 @@ mod euroc;
 mod kitti;
 mod mount;
 mod picture;
+mod truth;
 mod writer;
 
 use std::path::{Path, PathBuf};
@@ -23,6 +25,7 @@ use fencepost_core::geometry::{Mount, StereoCalibration};
 pub use camera::RecordedCamera;
 pub use error::{RecordingError, RecordingWarning};
 pub use picture::GreyPicture;
+pub use truth::{TrueDisparity, Truth};
 pub use writer::RecordingWriter;
 
 use crate::calibration::Calibration;
@@ -49,15 +52,6 @@ pub struct RecordedFrame {
     pub left: PathBuf,
     /// Right picture.
     pub right: PathBuf,
-}
-
-/// Folders with truth that lie beside the pictures.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Truth {
-    /// Disparity, `disp_occ_0/`.
-    pub disparity: Option<PathBuf>,
-    /// Lidar points, `velodyne/`.
-    pub lidar: Option<PathBuf>,
 }
 
 /// A recording that was opened: everything but the pictures is read.
@@ -112,8 +106,7 @@ impl Recording {
         warnings.extend(calibration.warnings.iter().cloned().map(RecordingWarning::Calibration));
         let mount = mount::read(folder, &mut warnings)?;
         warn_of_times(folder, layout, &frames, &mut warnings);
-        let present = |name: &str| Some(folder.join(name)).filter(|path| path.is_dir());
-        let truth = Truth { disparity: present("disp_occ_0"), lidar: present("velodyne") };
+        let truth = Truth::of(folder);
         Ok(Self { folder: folder.to_owned(), layout, calibration, mount, frames, truth, warnings })
     }
 

@@ -47,6 +47,16 @@ pub(super) fn decode(frame: u32, path: &Path) -> Result<(GreyPicture, Converted)
     Ok((GreyPicture { width, height, pixels }, Converted { colour, sixteen_bit }))
 }
 
+/// Decodes a grey picture of 16 bits: width, height, pixels row by row; `None` if it is of another kind.
+pub(super) fn decode_16_bit(frame: u32, path: &Path) -> Result<Option<(u32, u32, Vec<u16>)>, RecordingError> {
+    let bytes = read(frame, path)?;
+    let bad = |reason: String| RecordingError::BadPicture { frame, path: path.to_owned(), reason };
+    match reader(&bytes).and_then(ImageReader::decode).map_err(|e| bad(e.to_string()))? {
+        DynamicImage::ImageLuma16(grey) => Ok(Some((grey.width(), grey.height(), grey.into_raw()))),
+        _ => Ok(None),
+    }
+}
+
 /// Width and height of the picture at `path`, from its header alone.
 pub(super) fn size(frame: u32, path: &Path) -> Result<(u32, u32), RecordingError> {
     let bytes = read(frame, path)?;

@@ -2,6 +2,7 @@
 
 mod folder;
 mod reading;
+mod truth;
 mod writing;
 
 use std::fs;

@@ -5,6 +5,15 @@ use super::*;
 /// Surfaces by flood fill: for each pixel the number of its surface, from 0, in the order of the tiles and of the first
 /// pixels; and their sizes.
 pub(super) fn plain(input: &RandomPicture, has_distance: impl Fn(u16) -> bool) -> (Vec<Option<usize>>, Vec<usize>) {
+    plain_coded(input, &vec![0; input.pixels.len()], has_distance)
+}
+
+/// The same where only pixels of one code make a surface.
+fn plain_coded(
+    input: &RandomPicture,
+    codes: &[u8],
+    has_distance: impl Fn(u16) -> bool,
+) -> (Vec<Option<usize>>, Vec<usize>) {
     let RandomPicture { width, height, settings, pixels } = input;
     let steps = |x: usize, y: usize| Some(pixels[y * width + x].steps()).filter(|&s| s != 0 && has_distance(s));
     let mut labels = vec![None; pixels.len()];
@@ -30,7 +39,8 @@ pub(super) fn plain(input: &RandomPicture, has_distance: impl Fn(u16) -> bool) -
                                 continue;
                             }
                             let (Some(a), Some(b)) = (steps(x, y), steps(nx, ny)) else { continue };
-                            if a.abs_diff(b) <= settings.step_sixteenths {
+                            let alike = codes[y * width + x] == codes[ny * width + nx];
+                            if alike && a.abs_diff(b) <= settings.step_sixteenths {
                                 seen[ny * width + nx] = true;
                                 surface.push((nx, ny));
                             }
@@ -78,6 +88,52 @@ fn numbers_and_sizes_are_those_of_a_flood_fill() {
         assert_eq!(found, sizes, "{what}");
     }
     assert!(without_distance > 10_000, "the pictures held {without_distance} disparities without a distance");
+}
+
+#[test]
+fn surfaces_of_coded_pixels_are_those_of_a_flood_fill_and_have_their_class() {
+    const CLASSES: [SurfaceClass; CODES] =
+        [SurfaceClass::Undefined, SurfaceClass::Ground, SurfaceClass::Slanted, SurfaceClass::Obstacle];
+    const ROOM: usize = 24;
+    let mut random = Random::seeded("coded surfaces", 0x5eed_0104);
+    let (depth, rays) = (depth(), rays());
+    let mut stage = Box::new(Surfaces::<{ WIDTH * HEIGHT }, 1024>::new());
+    let mut small = Box::new(Surfaces::<{ WIDTH * HEIGHT }, ROOM>::new());
+    let (mut full, mut of_class) = (0, [0; CODES]);
+    for round in 0..3000 {
+        let mut input = RandomPicture::new(&mut random);
+        input.settings.min_pixels = 17;
+        let block = 1 + random.below(20) as usize;
+        let colours: Vec<u8> = (0..WIDTH * HEIGHT).map(|_| random.below(CODES as u32) as u8).collect();
+        let at = |i: usize| (i % input.width, i / input.width);
+        let codes: Vec<u8> =
+            (0..input.pixels.len()).map(at).map(|(x, y)| colours[y / block * WIDTH + x / block]).collect();
+        let (labels, sizes) = plain_coded(&input, &codes, |steps| steps > 16 && steps < DISPARITIES as u16 * 16);
+        stage.configure(&input.settings, input.width, input.height).unwrap();
+        stage.codes_mut().copy_from_slice(&codes);
+        let report = stage.run_coded(input.picture(), &depth, &rays, &CLASSES);
+        assert!(places(&stage, &input) == labels, "round {round}: {:?}", input.settings);
+        assert_eq!(report, SurfaceReport { found: sizes.len() as u32, dropped: 0 }, "round {round}");
+        for (i, label) in labels.iter().enumerate() {
+            if let Some(label) = *label {
+                assert_eq!(stage.table()[label].class, CLASSES[usize::from(codes[i])], "round {round}");
+                assert_eq!(stage.table()[label].pixels() as usize, sizes[label], "round {round}");
+                of_class[usize::from(codes[i])] += 1;
+            }
+        }
+        // Where the table is full the largest stay, with their classes.
+        if small.configure(&input.settings, input.width, input.height).is_ok() {
+            small.codes_mut().copy_from_slice(&codes);
+            let report = small.run_coded(input.picture(), &depth, &rays, &CLASSES);
+            assert_eq!(report.dropped as usize, sizes.len().saturating_sub(ROOM), "round {round}");
+            full += usize::from(report.dropped > 0);
+            for (i, place) in places(&small, &input).into_iter().enumerate() {
+                let class = place.map(|place| small.table()[place].class);
+                assert!(class.is_none_or(|class| class == CLASSES[usize::from(codes[i])]), "round {round}");
+            }
+        }
+    }
+    assert!(full > 100 && of_class.iter().all(|&pixels| pixels > 10_000), "{full}, {of_class:?}");
 }
 
 #[test]
