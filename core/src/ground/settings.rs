@@ -30,6 +30,9 @@ pub struct GroundSettings {
     pub terrain_share: f32,
     /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
     pub min_support_permille: f32,
+    /// If there is no ground at the height that the mount promises, a plane at another height is taken for the ground if this many of
+    /// 1000 pixels support it and hardly anything lies below it; with more than 1000 none is.
+    pub other_height_support_permille: f32,
     /// Frames for which the last plane is held when a frame has none; with 0 each frame stands on its own.
     pub hold_frames: u16,
 }
@@ -48,6 +51,7 @@ impl GroundSettings {
         terrain_max_slope_deg: 0.0,
         terrain_share: 0.0,
         min_support_permille: 0.0,
+        other_height_support_permille: 0.0,
         hold_frames: 0,
     };
 
@@ -67,6 +71,7 @@ impl GroundSettings {
         ConfigError::check("ground.terrain_max_slope_deg", self.terrain_max_slope_deg, 0.0, 60.0)?;
         ConfigError::check("ground.terrain_share", self.terrain_share, 0.0, 0.9)?;
         ConfigError::check("ground.min_support_permille", self.min_support_permille, 0.0, 1000.0)?;
+        ConfigError::check("ground.other_height_support_permille", self.other_height_support_permille, 0.0, 2000.0)?;
         ConfigError::check("ground.hold_frames", f32::from(self.hold_frames), 0.0, 1000.0)
     }
 }
@@ -85,6 +90,7 @@ impl Default for GroundSettings {
             terrain_max_slope_deg: 25.0,
             terrain_share: 0.15,
             min_support_permille: 2.0,
+            other_height_support_permille: 20.0,
             hold_frames: 10,
         }
     }
