@@ -124,6 +124,8 @@ impl GroundFinder {
                     share: self.settings.terrain_share,
                     max_slope: self.terrain_slope,
                     tolerance_m: self.settings.surface_tolerance_m,
+                    tolerance_per_m: self.settings.terrain_noise_px * plane.camera_height_m
+                        / geometry.0.focal_baseline_px_m().max(f32::MIN_POSITIVE),
                 };
                 self.terrain.fit(plane, surfaces, picture, geometry, &bend);
             }
@@ -290,7 +292,7 @@ impl GroundFinder {
             Height::OfMount => off <= self.settings.height_tolerance_m,
             Height::Unknown => plane.camera_height_m > LEAST_HEIGHT_M,
             Height::NotOfMount => {
-                plane.camera_height_m > LEAST_HEIGHT_M
+                plane.camera_height_m > LEAST_HEIGHT_M.max(LEAST_SHARE * expected)
                     && supported(self.settings.other_height_support_permille)
                     && self.is_lowest(plane, table)
             }
@@ -323,6 +325,9 @@ enum Height {
 
 /// A camera nearer to the ground sees none of it, metres.
 const LEAST_HEIGHT_M: f32 = 0.05;
+
+/// Least share of the height of the mount at which another plane may lie: what fills the view from near is not the ground.
+const LEAST_SHARE: f32 = 0.33;
 
 /// Largest share of what supports a plane at another height than that of the mount that may lie below it.
 const MOST_BELOW: f32 = 0.05;
