@@ -215,8 +215,9 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             }
             let place = |disparity: usize| min_disparity + disparities - 1 - disparity;
             let candidates = Candidates { first: place(largest), end: place(smallest) + 1 };
-            self.right.offer(&costs[candidates.first..candidates.end], x - largest, largest as u16);
-            if window == Window::Wide && !*weak {
+            if window == Window::Narrow {
+                self.right.offer(&costs[candidates.first..candidates.end], x - largest, largest as u16);
+            } else if !*weak {
                 continue;
             }
             *out = if saturated > max_saturated {
@@ -232,7 +233,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
                 Window::Wide => true,
             };
         }
-        if settings.back_check {
+        if settings.back_check && window == Window::Narrow {
             self.back_check(&mut out[first..end], first, window);
         }
     }
