@@ -9,7 +9,7 @@ use crate::{
     disparity::DisparityPicture,
     disparity::{DisparityPixel, Reason},
     geometry::{DepthTable, Mount, Place, Rays, RectifiedPair, VehicleFrame},
-    ground::{GroundFinder, GroundPlane, GroundSettings, Terrain},
+    ground::{GroundFinder, GroundPlane, GroundSettings},
     obstacles::{Obstacle, ObstacleFinder, ObstacleSettings},
     surfaces::{Regions, SurfaceSettings, Surfaces},
 };

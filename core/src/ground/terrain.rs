@@ -219,28 +219,29 @@ impl Default for Terrain {
 /// Adds to every patch the others, each `share` to the power of its distance, along one side and then along the other.
 fn spread(patches: &mut [[f32; ACROSS]; AHEAD], share: f32) {
     for row in patches.iter_mut() {
-        let mut carried = [0.0; ACROSS];
-        for j in 1..ACROSS {
-            carried[j] = share * (carried[j - 1] + row[j - 1]);
-        }
-        let mut back = 0.0;
-        for j in (0..ACROSS).rev() {
-            let own = row[j];
-            row[j] = own + carried[j] + back;
-            back = share * (back + own);
-        }
+        spread_line(row, share);
     }
     for j in 0..ACROSS {
-        let mut carried = [0.0; AHEAD];
-        for i in 1..AHEAD {
-            carried[i] = share * (carried[i - 1] + patches[i - 1][j]);
+        let mut column: [f32; AHEAD] = core::array::from_fn(|i| patches[i][j]);
+        spread_line(&mut column, share);
+        for (row, patch) in patches.iter_mut().zip(column) {
+            row[j] = patch;
         }
-        let mut back = 0.0;
-        for i in (0..AHEAD).rev() {
-            let own = patches[i][j];
-            patches[i][j] = own + carried[i] + back;
-            back = share * (back + own);
-        }
+    }
+}
+
+fn spread_line<const N: usize>(line: &mut [f32; N], share: f32) {
+    let mut before = [0.0; N];
+    let mut carried = 0.0;
+    for (before, own) in before.iter_mut().zip(&*line) {
+        *before = carried;
+        carried = share * (carried + own);
+    }
+    let mut behind = 0.0;
+    for (patch, before) in line.iter_mut().zip(before).rev() {
+        let own = *patch;
+        *patch = own + before + behind;
+        behind = share * (behind + own);
     }
 }
 

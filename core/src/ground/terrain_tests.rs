@@ -1,76 +1,249 @@
-//! Terrain against the ground that its surfaces were taken from.
+//! Terrain against the ground that a perfect camera sees in steps of 1/16 px.
 
 use std::vec::Vec;
 
 use super::*;
 use crate::{
+    disparity::Reason,
     geometry::{Mount, VehicleFrame},
-    planes::Scatter,
+    ground::GroundSettings,
+    obstacles::ObstacleSettings,
+    test_random::Random,
+    test_world::{Patch, Stages, World, ground},
 };
 
-fn level() -> GroundPlane {
-    GroundPlane::of_mount(&VehicleFrame::new(&Mount::default()).unwrap())
-}
+/// How the ground rises: distance ahead and height, metres, with straight ground between.
+type Profile<'a> = &'a [(f64, f64)];
 
-/// Surfaces on ground of the given height at some distances ahead, right of, on and left of the path.
-fn surfaces(ahead_m: impl Iterator<Item = f32>, height_m: impl Fn(f32) -> f32) -> Vec<Surface> {
-    let at = |x: f32, y: f32| Surface {
-        points: Scatter { weight: 500.0, mean_m: [x, y, height_m(x)], ..Scatter::default() },
-        normal: [0.0, 0.0, 1.0],
-        rms_m: 0.0,
-        class: SurfaceClass::Ground,
-    };
-    ahead_m.flat_map(|x| [-1.0, 0.0, 1.0].map(|y| at(x, y))).collect()
-}
+/// Where the first pixels of the ground come from, metres ahead.
+const FIRST_M: f64 = 2.5;
 
-fn steps(from: f32, to: f32) -> impl Iterator<Item = f32> {
-    (0..).map(move |i| from + 0.25 * i as f32).take_while(move |&x| x < to)
-}
-
-#[test]
-fn level_ground_does_not_bend() {
-    let terrain = Terrain::of(level(), &surfaces(steps(1.0, 20.0), |_| 0.0), 1.0);
-    assert!(steps(-5.0, 60.0).all(|x| terrain.lift_m(x).abs() < 1.0e-6));
-    let nothing = Terrain::of(level(), &[], 1.0);
-    assert!(steps(-5.0, 60.0).all(|x| nothing.lift_m(x) == 0.0));
-}
-
-#[test]
-fn a_slope_that_begins_ahead_is_followed() {
-    let slope = |x: f32| if x > 4.0 { (x - 4.0) * 10.0_f32.to_radians().tan() } else { 0.0 };
-    let terrain = Terrain::of(level(), &surfaces(steps(1.0, 20.0), slope), 1.0);
-    for x in steps(1.0, 19.5) {
-        let off = terrain.height_m([x, 0.0, slope(x)]).abs();
-        // The bend is smoothed over the bands beside it.
-        assert!(off < 0.06, "{off} m off at {x} m");
+fn world(profile: Profile<'_>) -> World {
+    let mut world = World::empty(1.2, 12.0, 0.0);
+    for piece in profile.windows(2) {
+        let [(x0, z0), (x1, z1)] = [piece[0], piece[1]];
+        let middle = [(x0 + x1) / 2.0, 0.0, (z0 + z1) / 2.0];
+        world.patches.push(Patch::new(middle, [(x1 - x0) / 2.0, 0.0, (z1 - z0) / 2.0], [0.0, 30.0, 0.0]));
     }
-    let beyond = terrain.lift_m(30.0);
-    assert!((beyond - slope(19.75)).abs() < 0.25, "held at {beyond} m beyond the last surface");
+    world
+}
+
+fn height_at(profile: Profile<'_>, x: f64) -> f64 {
+    let piece = profile.windows(2).find(|piece| x <= piece[1].0).expect("within the profile");
+    let [(x0, z0), (x1, z1)] = [piece[0], piece[1]];
+    z0 + (x - x0) / (x1 - x0) * (z1 - z0)
+}
+
+fn terrain(world: &World) -> Terrain {
+    let mut stages = Stages::new(&world.mount(), &GroundSettings::default(), &ObstacleSettings::default());
+    stages.ground(&world.render()).expect("there is ground");
+    stages.ground.terrain().clone()
+}
+
+fn steps(from: f64, to: f64) -> impl Iterator<Item = f64> {
+    (0..).map(move |i| from + 0.25 * f64::from(i)).take_while(move |&x| x < to)
+}
+
+/// Greatest height of true ground above or below the terrain along the path and a metre to both sides.
+fn worst(terrain: &Terrain, x: impl Iterator<Item = f64>, truth: impl Fn(f64, f64) -> f64) -> f64 {
+    let off = |x: f64, y: f64| f64::from(terrain.height_m([x as f32, y as f32, truth(x, y) as f32])).abs();
+    x.flat_map(|x| [-1.0, 0.0, 1.0].map(|y| off(x, y))).fold(0.0, f64::max)
+}
+
+#[test]
+fn level_ground_is_level() {
+    for (height_m, pitch_down_deg, roll_deg) in [(1.2, 12.0, 0.0), (0.6, 20.0, 3.0), (1.7, 5.0, -4.0)] {
+        let world = World::level(height_m, pitch_down_deg, roll_deg);
+        let terrain = terrain(&world);
+        let lift = steps(0.0, 15.0).flat_map(|x| [-1.0, 0.0, 1.0].map(|y| terrain.lift_m(x as f32, y).abs()));
+        let lift = lift.fold(0.0, f32::max);
+        let off = worst(&terrain, steps(0.0, 15.0), |_, _| 0.0);
+        std::println!("{height_m} m: lifted by {lift:.4} m, {off:.4} m off");
+        assert!(lift < 0.015 && off < 0.015, "{height_m} m: lifted by {lift} m, {off} m off");
+    }
+}
+
+#[test]
+fn ground_that_bends_ahead_is_followed() {
+    let rise = |degrees: f64, along_m: f64| degrees.to_radians().tan() * along_m;
+    let slope = [(0.0, 0.0), (4.0, 0.0), (30.0, rise(10.0, 26.0))];
+    let steep = [(0.0, 0.0), (5.0, 0.0), (30.0, rise(15.0, 25.0))];
+    let falling = [(0.0, 0.0), (4.0, 0.0), (30.0, rise(-4.0, 26.0))];
+    let crest = [(0.0, 0.0), (4.0, 0.0), (9.0, rise(8.0, 5.0)), (30.0, rise(8.0, 5.0))];
+    let dip = [(0.0, 0.0), (4.0, 0.0), (8.0, rise(-5.0, 4.0)), (30.0, rise(-5.0, 4.0) + rise(5.0, 22.0))];
+    for (name, profile) in
+        [("slope", &slope[..]), ("steep slope", &steep), ("falling", &falling), ("crest", &crest), ("dip", &dip)]
+    {
+        let terrain = terrain(&world(profile));
+        let off = worst(&terrain, steps(FIRST_M, 14.0), |x, _| height_at(profile, x));
+        std::println!("{name}: {off:.3} m off");
+        // Bends are smoothed over a patch on either side.
+        assert!(off < 0.1, "{name}: {off} m off");
+    }
+}
+
+#[test]
+fn ground_that_tilts_aside_is_followed() {
+    for (ahead_deg, aside_deg) in [(0.0, 8.0), (6.0, -6.0), (-4.0, 10.0)] {
+        let [ahead, aside] = [ahead_deg, aside_deg].map(|degrees: f64| degrees.to_radians().tan());
+        let mut world = World::empty(1.2, 12.0, 0.0);
+        world.patches.push(Patch::new([0.0; 3], [40.0, 0.0, 40.0 * ahead], [0.0, 40.0, 40.0 * aside]));
+        let off = worst(&terrain(&world), steps(FIRST_M, 14.0), |x, y| ahead * x + aside * y);
+        std::println!("{ahead_deg} and {aside_deg} degrees: {off:.3} m off");
+        assert!(off < 0.05, "{ahead_deg} and {aside_deg} degrees: {off} m off");
+    }
+}
+
+/// A bank beside the path, 15 degrees steep from 2 m to the left on.
+#[test]
+fn a_bank_is_followed() {
+    let foot = 2.0;
+    let rise = 15.0_f64.to_radians().tan();
+    let mut world = World::empty(1.2, 12.0, 0.0);
+    world.patches.push(Patch::new([0.0, foot - 30.0, 0.0], [60.0, 0.0, 0.0], [0.0, 30.0, 0.0]));
+    world.patches.push(Patch::new([0.0, foot + 10.0, 10.0 * rise], [60.0, 0.0, 0.0], [0.0, 10.0, 10.0 * rise]));
+    let terrain = terrain(&world);
+    let mut worst = 0.0_f64;
+    for x in steps(5.0, 12.0) {
+        for y in steps(-2.0, 4.5).filter(|y| y.abs() < 0.6 * x) {
+            let truth = (y - foot).max(0.0) * rise;
+            worst = worst.max(f64::from(terrain.height_m([x as f32, y as f32, truth as f32])).abs());
+        }
+    }
+    std::println!("{worst:.3} m off");
+    assert!(worst < 0.12, "{worst} m off");
+}
+
+/// How far the terrain lies above the ground under the top of a box that is 0.8 m high, from `near` to `far` ahead.
+fn lift_under_a_box(near: f64, far: f64, half_width: f64) -> f32 {
+    let mut world = World::level(1.7, 12.0, 0.0);
+    world.add_box([near, -half_width, 0.0], [far, half_width, 0.8], 0.0);
+    let terrain = terrain(&world);
+    let points = steps(near + 0.25, far).flat_map(|x| [-0.5, 0.0, 0.5].map(|y| (x, y)));
+    let lift = points.map(|(x, y)| terrain.height_m([x as f32, y, 0.0]).abs()).fold(0.0, f32::max);
+    std::println!("box from {near} to {far} m: {lift:.3} m off under it");
+    lift
+}
+
+/// As level as ground, but not to be reached from it.
+#[test]
+fn the_top_of_a_box_is_not_followed() {
+    let boxes = [(5.0, 9.0, 1.5), (4.0, 8.0, 1.0), (4.4, 7.0, 0.8), (5.6, 9.0, 2.0)];
+    let followed: Vec<_> =
+        boxes.into_iter().filter(|&(near, far, half_width)| lift_under_a_box(near, far, half_width) > 0.1).collect();
+    assert!(followed.is_empty(), "{followed:?}");
+}
+
+/// So flat to the eye that some patches of it have no pixel.
+#[test]
+fn the_top_of_a_long_box_is_not_followed() {
+    assert!(lift_under_a_box(6.0, 12.0, 3.0) < 0.1);
+}
+
+#[test]
+fn what_stands_on_the_ground_does_not_lift_it() {
+    let mut random = Random::seeded("boxes on the terrain", 0x5eed_0132);
+    let mut worst = 0.0_f32;
+    for round in 0..30 {
+        let mut world = World::level(1.2, 12.0, 0.0);
+        let (x, y) = (random.within(2.5, 8.0), random.within(-1.5, 1.5));
+        let (width, height) = (random.within(0.3, 1.0), random.within(0.25, 1.1));
+        world.add_box([x, y - width / 2.0, 0.0], [x + 0.6, y + width / 2.0, height], random.within(-45.0, 45.0));
+        let terrain = terrain(&world);
+        for ahead in steps(x - 1.5, x + 1.5) {
+            for aside in steps(y - 1.0, y + 1.0) {
+                let off = terrain.height_m([ahead as f32, aside as f32, 0.0]).abs();
+                worst = worst.max(off);
+                assert!(off < 0.06, "round {round}: {off} m off at {ahead}, {aside}; {width} x {height} at {x}, {y}");
+            }
+        }
+    }
+    std::println!("ground lifted by up to {worst:.3} m");
 }
 
 #[test]
 fn a_gap_lies_between_its_edges() {
-    let step = |x: f32| if x > 10.0 { 0.3 } else { 0.0 };
-    let terrain = Terrain::of(level(), &surfaces(steps(2.0, 6.0).chain(steps(14.0, 18.0)), step), 1.0);
-    for x in steps(6.0, 14.0) {
-        assert!((-0.01..=0.31).contains(&terrain.lift_m(x)), "{} m at {x} m", terrain.lift_m(x));
+    // Rising from 6 m on, but not seen between 6 m and 7.5 m.
+    let rise = 3.0_f64.to_radians().tan();
+    let profile = [(0.0, 0.0), (6.0, 0.0), (30.0, 24.0 * rise)];
+    let mut world = world(&profile);
+    let unseen = Patch::new([6.75, 0.0, 0.75 * rise + 0.001], [0.75, 0.0, 0.75 * rise], [0.0, 30.0, 0.0]);
+    world.patches.push(Patch { hole: Some(Reason::LowTexture), ..unseen });
+    let terrain = terrain(&world);
+    let height = |x: f64| -f64::from(terrain.height_m([x as f32, 0.0, 0.0]));
+    for x in steps(6.0, 7.5) {
+        assert!((-0.02..=1.5 * rise + 0.02).contains(&height(x)), "{} m at {x} m", height(x));
     }
-    assert!(terrain.lift_m(4.0).abs() < 0.02 && (terrain.lift_m(16.0) - 0.3).abs() < 0.02);
+    for x in steps(FIRST_M, 5.5).chain(steps(8.25, 14.0)) {
+        assert!((height(x) - height_at(&profile, x)).abs() < 0.06, "{} m at {x} m", height(x));
+    }
 }
 
 #[test]
-fn only_surfaces_on_the_ground_count() {
-    let mut table = surfaces(steps(2.0, 10.0), |_| 1.0);
-    for surface in &mut table {
-        surface.class = SurfaceClass::Horizontal;
+fn without_surfaces_the_plane_remains() {
+    let mut stages = Stages::new(&Mount::default(), &GroundSettings::default(), &ObstacleSettings::default());
+    let level = GroundPlane::of_mount(&VehicleFrame::new(&Mount::default()).unwrap());
+    let world = World { patches: std::vec![ground(0.0)], ..World::empty(1.2, 12.0, 0.0) };
+    stages.ground(&world.render());
+    stages.ground.forget();
+    assert_eq!(stages.ground(&World::empty(1.2, 12.0, 0.0).render()), None);
+    let terrain = stages.ground.terrain();
+    assert_eq!(*terrain.plane(), level);
+    assert!(steps(-5.0, 60.0).all(|x| [-40.0, 0.0, 40.0].iter().all(|&y| terrain.lift_m(x as f32, y) == 0.0)));
+}
+
+#[test]
+fn between_the_middles_of_patches_the_ground_is_straight() {
+    let mut random = Random::seeded("patches", 0x5eed_0133);
+    let mut terrain = Terrain { patch_m: 0.5, ..Terrain::new() };
+    let (slope, aside, level) = (0.3_f32, -0.2_f32, 0.1_f32);
+    for (i, row) in terrain.lift_m.iter_mut().enumerate() {
+        for (j, lift) in row.iter_mut().enumerate() {
+            let (x, y) = ((i as f32 + 0.5) * 0.5, (j as f32 + 0.5 - 20.0) * 0.5);
+            *lift = level + slope * x + aside * y;
+        }
     }
-    assert_eq!(Terrain::of(level(), &table, 1.0), Terrain::flat(level()));
+    for _ in 0..1000 {
+        let (x, y) = (random.within(0.25, 19.75) as f32, random.within(-9.75, 9.75) as f32);
+        let truth = level + slope * x + aside * y;
+        assert!((terrain.lift_m(x, y) - truth).abs() < 1.0e-4, "{x}, {y}");
+    }
+    // Beyond the patches the last one counts.
+    for (x, y, at) in [(25.0, 0.0, (19.75, 0.0)), (-3.0, 2.0, (0.25, 2.0)), (5.0, 40.0, (5.0, 9.75))] {
+        assert!((terrain.lift_m(x, y) - (level + slope * at.0 + aside * at.1)).abs() < 1.0e-4, "{x}, {y}");
+    }
+}
+
+#[test]
+fn each_patch_takes_in_what_the_others_know_by_distance() {
+    let mut random = Random::seeded("spread", 0x5eed_0134);
+    let patches: [[f32; ACROSS]; AHEAD] = core::array::from_fn(|_| {
+        core::array::from_fn(|_| if random.below(8) == 0 { random.within(0.0, 50.0) as f32 } else { 0.0 })
+    });
+    for share in [0.0_f32, 0.15, 0.9] {
+        let mut found = patches;
+        spread(&mut found, share);
+        for (i, row) in found.iter().enumerate() {
+            for (j, found) in row.iter().enumerate() {
+                let mut expected = 0.0;
+                for (k, row) in patches.iter().enumerate() {
+                    for (l, own) in row.iter().enumerate() {
+                        let steps = (i.abs_diff(k) + j.abs_diff(l)) as i32;
+                        expected += f64::from(*own) * f64::from(share).powi(steps);
+                    }
+                }
+                let off = (f64::from(*found) - expected).abs();
+                assert!(off <= 1.0e-5 * expected + 1.0e-6, "share {share}, patch {i}, {j}: {found}, not {expected}");
+            }
+        }
+    }
 }
 
 #[test]
 fn no_place_is_out_of_reach() {
-    let terrain = Terrain::of(level(), &surfaces(steps(-50.0, 200.0), |x| x), 1.0);
-    for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, 47.5, 48.0, 1.0e30] {
-        let _ = terrain.lift_m(x);
+    let terrain = terrain(&World::level(1.2, 12.0, 0.0));
+    let places = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 29.9, 30.0, -15.0, 15.0, 1.0e30, -1.0e30];
+    for (x, y) in places.into_iter().flat_map(|x| places.map(|y| (x, y))) {
+        let _ = terrain.lift_m(x, y);
     }
 }

@@ -167,9 +167,11 @@ fn limits_of_tilt_height_and_support_hold() {
     assert_eq!(find(&sloping, &mount, &GroundSettings { max_tilt_deg: 12.0, ..settings }), None);
 
     let level = World::level(1.2, 20.0, 0.0);
+    // More than 1000 of 1000 pixels: never at another height than that of the mount.
+    let strict = GroundSettings { other_height_support_permille: 1001.0, ..settings };
     for (height_m, found) in [(1.2, true), (0.8, true), (1.6, true), (0.6, false), (1.8, false)] {
         let mount = Mount { height_m: Some(height_m), ..level.mount() };
-        assert_eq!(find(&level, &mount, &settings).is_some(), found, "{height_m} m");
+        assert_eq!(find(&level, &mount, &strict).is_some(), found, "{height_m} m");
     }
     let far_off = Mount { height_m: None, ..level.mount() };
     let high = World::level(3.2, 40.0, 0.0);
@@ -180,6 +182,35 @@ fn limits_of_tilt_height_and_support_hold() {
     let permille = plane.support as f32 * 1000.0 / (320.0 * 240.0);
     assert!(find(&level, &level.mount(), &support(permille - 1.0)).is_some());
     assert_eq!(find(&level, &level.mount(), &support(permille + 1.0)), None);
+}
+
+#[test]
+fn ground_at_another_height_than_that_of_the_mount_is_large_and_the_lowest() {
+    let settings = GroundSettings::default();
+    let level = World::level(1.2, 20.0, 0.0);
+    for height_m in [0.6, 1.8, 2.4] {
+        let mount = Mount { height_m: Some(height_m), ..level.mount() };
+        let plane = find(&level, &mount, &settings).unwrap_or_else(|| panic!("{height_m} m: no ground"));
+        assert!(errors(&plane, &level)[0].abs() < 0.005, "{plane:?}");
+        let permille = plane.support as f32 * 1000.0 / (320.0 * 240.0);
+        let support = |permille| GroundSettings { other_height_support_permille: permille, ..settings };
+        assert!(find(&level, &mount, &support(permille - 1.0)).is_some());
+        assert_eq!(find(&level, &mount, &support(permille + 1.0)), None);
+    }
+    // A table before the camera, the ground under it out of the reach of the mount's height: the table is not the ground.
+    let mut room = World::empty(1.2, 20.0, 0.0);
+    room.patches.push(ground(-1.2));
+    room.patches.push(Patch::new([4.0, 0.0, 0.6], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]));
+    let plane = find(&room, &room.mount(), &settings).expect("the floor");
+    assert!((plane.camera_height_m - 2.4).abs() < 0.02, "{plane:?}");
+    // With a part of the floor that is smaller than the table, neither is: the table has something below it.
+    let demanding = GroundSettings { other_height_support_permille: 40.0, ..settings };
+    let mut table = World::empty(1.2, 20.0, 0.0);
+    table.patches.push(Patch::new([4.0, 0.0, 0.6], [2.0, 0.0, 0.0], [0.0, 0.8, 0.0]));
+    let alone = find(&table, &table.mount(), &demanding).expect("nothing lies below it");
+    assert!((alone.camera_height_m - 0.6).abs() < 0.02, "{alone:?}");
+    table.patches.push(Patch::new([9.0, 0.0, -1.2], [0.4, 0.0, 0.0], [0.0, 20.0, 0.0]));
+    assert_eq!(find(&table, &table.mount(), &demanding), None);
 }
 
 #[test]
@@ -194,6 +225,11 @@ fn settings_that_cannot_be_are_named() {
     assert_eq!(field(GroundSettings { surface_tolerance_per_m: 1.0, ..good }), "ground.surface_tolerance_per_m");
     assert_eq!(field(GroundSettings { max_range_m: f32::INFINITY, ..good }), "ground.max_range_m");
     assert_eq!(field(GroundSettings { corridor_m: 0.0, ..good }), "ground.corridor_m");
+    assert_eq!(field(GroundSettings { terrain_patch_m: 0.0, ..good }), "ground.terrain_patch_m");
+    assert_eq!(field(GroundSettings { terrain_max_slope_deg: 61.0, ..good }), "ground.terrain_max_slope_deg");
+    assert_eq!(field(GroundSettings { terrain_share: 1.0, ..good }), "ground.terrain_share");
     assert_eq!(field(GroundSettings { min_support_permille: 1001.0, ..good }), "ground.min_support_permille");
+    let other = GroundSettings { other_height_support_permille: 2001.0, ..good };
+    assert_eq!(field(other), "ground.other_height_support_permille");
     assert_eq!(field(GroundSettings { hold_frames: 1001, ..good }), "ground.hold_frames");
 }

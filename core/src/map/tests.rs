@@ -8,7 +8,7 @@ use crate::{
     geometry::Place,
     ground::{GroundPlane, GroundSettings},
     obstacles::ObstacleSettings,
-    surfaces::SurfaceClass,
+    surfaces::{Surface, SurfaceClass, TILE},
     test_random::Random,
     test_world::{DISPARITIES, PAIR, Patch, Point, Stages, World},
 };
@@ -38,9 +38,8 @@ fn make(world: &World, settings: MapSettings, ground_settings: &GroundSettings) 
     builder.configure(&settings, (obstacles.min_height_m, obstacles.clearance_m)).unwrap();
     let mut map = Box::new(ObstacleMap::EMPTY);
     let view = view(&stages);
-    let terrain = stages.terrain(ground);
     let picture = DisparityPicture::new(&pixels, 320);
-    builder.run(&stages.surfaces, picture, &view, &terrain, ground.is_some(), &mut map);
+    builder.run(&stages.surfaces, picture, &view, stages.ground.terrain(), ground.is_some(), &mut map);
     Made { stages, ground, map, pixels, settings }
 }
 
@@ -75,7 +74,8 @@ struct Votes {
 fn plain_votes(world: &World, made: &Made) -> Vec<Votes> {
     let geometry = made.settings.geometry;
     let mut votes = vec![Votes::default(); geometry.len()];
-    let terrain = made.stages.terrain(made.ground);
+    let obstacles = ObstacleSettings::default();
+    let terrain = made.stages.ground.terrain();
     let plane = terrain.plane();
     let normal = Point::from(plane.normal.map(f64::from));
     let size = f64::from(geometry.cell_size_mm) / 1000.0;
@@ -85,28 +85,28 @@ fn plain_votes(world: &World, made: &Made) -> Vec<Votes> {
         let disparity = f64::from(pixel.steps()) / 16.0;
         let z = f64::from(PAIR.focal_px) * f64::from(PAIR.baseline_m) / disparity;
         let p = Point::new(0.0, 0.0, world.height_m) + world.direction(u as f64, v as f64) * z;
-        let height = normal.dot(&p) - f64::from(plane.offset_m) - f64::from(terrain.lift_m(p.x as f32));
+        let height = normal.dot(&p) - f64::from(plane.offset_m) - f64::from(terrain.lift_m(p.x as f32, p.y as f32));
         // Nearness to any limit that decides, metres; the table of distances is within 3e-5 of the distance.
         let near = 5.0e-5 * z;
         let edge = |x: f64| ((x / size).round() * size - x).abs() < near;
-        let limit = |h: f64| (height - h).abs() < near;
-        let (min_height, clearance) = (0.25, 2.2);
-        let free_max = f64::from(made.settings.free_max_height_m);
+        let noise = plain_noise(world, made, surface, (u, v));
+        let [least_height, free_max] = [obstacles.min_height_m, made.settings.free_max_height_m]
+            .map(|limit| noise.map(|noise| f64::from(limit).max(noise)));
+        let clearance = f64::from(obstacles.clearance_m);
+        let within = |[low, high]: [f64; 2]| height > low - near && height < high + near;
         let at = world.to_vehicle(p);
-        let uncertain = edge(at.x) || edge(at.y) || [min_height, clearance, free_max].into_iter().any(limit);
-        let range = f64::from(surface.points.mean_m[0]).hypot(f64::from(surface.points.mean_m[1]));
-        let camera_height = normal.z * world.height_m - f64::from(plane.offset_m);
-        let noise = 0.3 * camera_height * range / (f64::from(PAIR.focal_px) * f64::from(PAIR.baseline_m));
-        let rough = f64::from(surface.rms_m) > f64::from(made.settings.mixed_rms_m) + noise;
-        let counts_obstacle = surface.class == SurfaceClass::Obstacle || surface.class == SurfaceClass::Ground && rough;
-        let kind = if counts_obstacle && height >= min_height && height <= clearance {
+        let limits = [least_height, free_max, [clearance; 2]];
+        let uncertain = edge(at.x) || edge(at.y) || limits.into_iter().any(within);
+        let on_ground = surface.class == SurfaceClass::Ground;
+        let may_stand = on_ground || surface.class == SurfaceClass::Obstacle;
+        let kind = if height > clearance {
+            None
+        } else if may_stand && height >= least_height[1] {
             Some(0)
-        } else if surface.class == SurfaceClass::Ground && height <= free_max {
-            Some(1)
-        } else if height > free_max && height <= clearance {
+        } else if height > free_max[1] {
             Some(2)
         } else {
-            None
+            on_ground.then_some(1)
         };
         for (dx, dy) in [(0.0, 0.0), (near, near), (near, -near), (-near, near), (-near, -near)] {
             let (i, j) = (((at.x + dx) / size).floor(), ((at.y + dy) / size).floor());
@@ -125,12 +125,32 @@ fn plain_votes(world: &World, made: &Made) -> Vec<Votes> {
     votes
 }
 
+/// Least and greatest error that the height of a pixel of a surface must be expected to have, over the pixels of its tile in its
+/// row: the error of the distance to the surface times the rate at which a ray there nears the ground.
+fn plain_noise(world: &World, made: &Made, surface: &Surface, (u, v): (usize, usize)) -> [f64; 2] {
+    let terrain = made.stages.ground.terrain();
+    let [x, y, _] = surface.points.mean_m;
+    let rise = |(dx, dy): (f32, f32)| {
+        let [before, after] = [-0.75, 0.75].map(|s| f64::from(terrain.lift_m(x + s * dx, y + s * dy)));
+        (after - before) / 1.5
+    };
+    let normal =
+        Point::from(terrain.plane().normal.map(f64::from)) - Point::new(rise((1.0, 0.0)), rise((0.0, 1.0)), 0.0);
+    let range_square = f64::from(x).powi(2) + f64::from(y).powi(2);
+    let distance_error = f64::from(made.settings.height_noise_px) * range_square
+        / (f64::from(PAIR.focal_px) * f64::from(PAIR.baseline_m));
+    let first = u - u % TILE;
+    let ends =
+        [first, first + TILE - 1].map(|u| distance_error * normal.dot(&world.direction(u as f64, v as f64)).abs());
+    [ends[0].min(ends[1]), ends[0].max(ends[1])]
+}
+
 /// Votes needed for an obstacle and for a free cell, and the distance of the cell's ground; `None` behind the camera.
 fn plain_needs(world: &World, made: &Made, (x, y): (f64, f64)) -> Option<(f64, f64, f64, f64, f64)> {
-    let terrain = made.stages.terrain(made.ground);
+    let terrain = made.stages.ground.terrain();
     let plane = terrain.plane();
     let n = plane.normal.map(f64::from);
-    let z = (f64::from(plane.offset_m) + f64::from(terrain.lift_m(x as f32)) - n[0] * x - n[1] * y) / n[2];
+    let z = (f64::from(plane.offset_m) + f64::from(terrain.lift_m(x as f32, y as f32)) - n[0] * x - n[1] * y) / n[2];
     let camera = world.rotation().transpose() * (Point::new(x, y, z) - Point::new(0.0, 0.0, world.height_m));
     if camera.z <= 0.0 {
         return None;
@@ -158,8 +178,7 @@ fn cells_are_those_of_a_plain_count_of_votes() {
     ];
     let small = MapGeometry { cell_size_mm: 250, x_first: 2, x_count: 50, y_first: -20, y_count: 50 };
     for (world, geometry) in worlds.iter().flat_map(|w| [(w, MapGeometry::default()), (w, small)]) {
-        // A limit far from the few votes that rounding can move from cell to cell, so that most cells can be judged.
-        let settings = MapSettings { geometry, max_range_m: 14.0, obstacle_cover: 0.1, ..MapSettings::default() };
+        let settings = MapSettings { geometry, max_range_m: 14.0, ..MapSettings::default() };
         let made = make(world, settings, &GroundSettings::default());
         assert!(made.ground.is_some());
         let votes = plain_votes(world, &made);
@@ -370,12 +389,12 @@ fn pictures_of_another_size_make_a_map_without_free_cells() {
     let world = scene();
     let made = make(&world, MapSettings::default(), &GroundSettings::default());
     let mut builder = Box::new(MapBuilder::<CELLS>::new());
-    builder.configure(&MapSettings::default(), (0.25, 2.2)).unwrap();
+    builder.configure(&MapSettings::default(), (0.25, 2.5)).unwrap();
     let mut map = Box::new(ObstacleMap::<CELLS>::EMPTY);
-    let terrain = made.stages.terrain(made.ground);
+    let terrain = made.stages.ground.terrain();
     for (pixels, width) in [(320 * 240, 160), (320 * 10, 320), (0, 320), (0, 0), (320 * 240, 321), (64, 8)] {
         let picture = DisparityPicture::new(&made.pixels[..pixels], width);
-        builder.run(&made.stages.surfaces, picture, &view(&made.stages), &terrain, true, &mut map);
+        builder.run(&made.stages.surfaces, picture, &view(&made.stages), terrain, true, &mut map);
         assert_eq!(map.cells.len(), CELLS);
         assert_eq!(count(&map, CellState::Free) + count(&map, CellState::Obstacle), 0);
     }
@@ -538,6 +557,7 @@ fn settings_that_cannot_be_are_named() {
     assert_eq!(field(MapSettings { free_cover: 1.1, ..good }), "map.free_cover");
     assert_eq!(field(MapSettings { free_min_pixels: 0, ..good }), "map.free_min_pixels");
     assert_eq!(field(MapSettings { free_max_height_m: 0.0, ..good }), "map.free_max_height_m");
+    assert_eq!(field(MapSettings { height_noise_px: -0.1, ..good }), "map.height_noise_px");
     assert_eq!(field(MapSettings { max_range_m: f32::INFINITY, ..good }), "map.max_range_m");
     assert_eq!(field(MapSettings { sector_width_deg: 18.5, ..good }), "map.sector_width_deg");
 }

@@ -29,3 +29,7 @@ pub(super) fn codes(rows: [&[u8]; ROWS], out: &mut [u8]) {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "census_tests.rs"]
+mod tests;

@@ -172,3 +172,7 @@ impl MatchSettings {
         range("matching.saturated_percent", self.saturated_percent, 1, 100)
     }
 }
+
+#[cfg(test)]
+#[path = "settings_tests.rs"]
+mod tests;

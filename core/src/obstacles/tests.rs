@@ -142,6 +142,7 @@ fn every_threshold_counts() {
         platform_height_m: 5.0,
         clearance_m: 5.0,
         min_pixels: 0,
+        min_area_m2: 0.0,
         min_size_m: 0.0,
         max_range_m: 50.0,
     };
@@ -159,6 +160,9 @@ fn every_threshold_counts() {
         (ObstacleSettings { max_range_m: 3.4, ..loose }, 0),
         (ObstacleSettings { min_pixels: pixels, ..loose }, 1),
         (ObstacleSettings { min_pixels: pixels + 1, ..loose }, 0),
+        // A panel of 1 m x 0.5 m, to the pixel.
+        (ObstacleSettings { min_area_m2: 0.47, ..loose }, 1),
+        (ObstacleSettings { min_area_m2: 0.53, ..loose }, 0),
         (ObstacleSettings { min_size_m: size - 1.0e-3, ..loose }, 1),
         (ObstacleSettings { min_size_m: size + 1.0e-3, ..loose }, 0),
     ] {
@@ -255,6 +259,7 @@ fn settings_that_cannot_be_are_named() {
     assert_eq!(field(ObstacleSettings { platform_height_m: 0.1, ..good }), "obstacles.platform_height_m");
     assert_eq!(field(ObstacleSettings { clearance_m: 0.1, ..good }), "obstacles.clearance_m");
     assert_eq!(field(ObstacleSettings { min_pixels: 10_001, ..good }), "obstacles.min_pixels");
+    assert_eq!(field(ObstacleSettings { min_area_m2: 10.1, ..good }), "obstacles.min_area_m2");
     assert_eq!(field(ObstacleSettings { min_size_m: f32::NAN, ..good }), "obstacles.min_size_m");
     assert_eq!(field(ObstacleSettings { max_range_m: 0.0, ..good }), "obstacles.max_range_m");
 }
