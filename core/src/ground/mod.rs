@@ -14,7 +14,7 @@ use crate::{
     disparity::DisparityPicture,
     error::ConfigError,
     geometry::{DepthTable, Rays, VehicleFrame},
-    planes::Scatter,
+    planes::{Scatter, SymmetricMatrix3},
     surfaces::{Regions, Surface, SurfaceClass, Surfaces},
 };
 
@@ -38,6 +38,10 @@ pub struct GroundFinder {
     frame: Option<VehicleFrame>,
     height_known: bool,
     min_support: f32,
+    min_support_elsewhere: f32,
+    /// How far a point moves along its ray for the error of a disparity that must be expected, in parts of its distance and for each
+    /// metre of it.
+    noise_per_m: f32,
     /// Tangents of the largest tilt and of the steepest ground, cosine of the largest tilt.
     max_slope: f32,
     terrain_slope: f32,
@@ -54,6 +58,8 @@ impl GroundFinder {
             frame: None,
             height_known: false,
             min_support: 0.0,
+            min_support_elsewhere: 0.0,
+            noise_per_m: 0.0,
             max_slope: 0.0,
             terrain_slope: 0.0,
             least_upright: 0.0,
@@ -78,6 +84,7 @@ impl GroundFinder {
         self.frame = Some(*frame);
         self.height_known = height_known;
         self.min_support = settings.min_support_permille * 1.0e-3 * pixels as f32;
+        self.min_support_elsewhere = settings.other_height_support_permille * 1.0e-3 * pixels as f32;
         let max_tilt = settings.max_tilt_deg.to_radians();
         self.max_slope = libm::tanf(max_tilt);
         self.terrain_slope = libm::tanf(settings.terrain_max_slope_deg.to_radians());
@@ -101,6 +108,8 @@ impl GroundFinder {
         geometry: (&DepthTable<DISPARITIES>, &Rays),
     ) -> Option<GroundPlane> {
         let frame = self.frame?;
+        let focal_baseline_px_m = geometry.0.focal_baseline_px_m().max(f32::MIN_POSITIVE);
+        self.noise_per_m = self.settings.plane_noise_px / focal_baseline_px_m;
         let mut found = None;
         for height in self.heights() {
             regions.join(surfaces, picture, |surface| self.may_be_ground(surface, height));
@@ -124,8 +133,7 @@ impl GroundFinder {
                     share: self.settings.terrain_share,
                     max_slope: self.terrain_slope,
                     tolerance_m: self.settings.surface_tolerance_m,
-                    tolerance_per_m: self.settings.terrain_noise_px * plane.camera_height_m
-                        / geometry.0.focal_baseline_px_m().max(f32::MIN_POSITIVE),
+                    tolerance_per_m: self.settings.terrain_noise_px * plane.camera_height_m / focal_baseline_px_m,
                 };
                 self.terrain.fit(plane, surfaces, picture, geometry, &bend);
             }
@@ -265,14 +273,30 @@ impl GroundFinder {
         self.plausible(&plane, table, height).then_some((weight, plane))
     }
 
-    /// The points of a surface with the weight that their heights deserve. The height of a point on the ground is as
-    /// uncertain as its distance is long (the error of the distance grows with its square, the slope of the ray falls with
-    /// it), so the weight falls with the square; and it falls to the sides, where the road does not lead.
+    /// The points of a surface with the weight that their heights deserve, and without what noise adds to their spread.
+    ///
+    /// The height of a point on the ground is as uncertain as its distance is long (the error of the distance grows with its square,
+    /// the slope of the ray falls with it), so the weight falls with the square; and it falls to the sides, where the road does not
+    /// lead. The error of a disparity moves a point along its ray, down when it moves away: taken for the spread of the surface, it
+    /// would tilt the plane away from the camera.
     fn weighed(&self, surface: &Surface) -> Scatter {
         let [x, y, _] = surface.points.mean_m;
         let aside = y / self.settings.corridor_m;
         let weight = surface.points.weight / ((1.0 + x * x + y * y) * (1.0 + aside * aside));
-        Scatter { weight, ..surface.points }
+        let camera_m = self.frame.map_or([0.0; 3], |frame| frame.point([0.0; 3]));
+        let ray: [f32; 3] = core::array::from_fn(|i| surface.points.mean_m[i] - camera_m[i]);
+        let shift = self.noise_per_m * libm::sqrtf(ray.iter().map(|r| r * r).sum());
+        let noise = ray.map(|r| r * shift);
+        let c = surface.points.covariance;
+        let covariance = SymmetricMatrix3 {
+            xx: c.xx - noise[0] * noise[0],
+            xy: c.xy - noise[0] * noise[1],
+            xz: c.xz - noise[0] * noise[2],
+            yy: c.yy - noise[1] * noise[1],
+            yz: c.yz - noise[1] * noise[2],
+            zz: c.zz - noise[2] * noise[2],
+        };
+        Scatter { weight, covariance, ..surface.points }
     }
 
     fn lies_on(&self, plane: &GroundPlane, surface: &Surface) -> bool {
@@ -286,14 +310,12 @@ impl GroundFinder {
         let level = plane.normal[2] >= self.least_upright;
         let expected = self.frame.map_or(0.0, |frame| frame.camera_height_m());
         let off = (plane.camera_height_m - expected).abs();
-        let supported =
-            |permille: f32| plane.support as f32 * self.settings.min_support_permille >= permille * self.min_support;
         let height = match height {
             Height::OfMount => off <= self.settings.height_tolerance_m,
             Height::Unknown => plane.camera_height_m > LEAST_HEIGHT_M,
             Height::NotOfMount => {
                 plane.camera_height_m > LEAST_HEIGHT_M.max(LEAST_SHARE * expected)
-                    && supported(self.settings.other_height_support_permille)
+                    && plane.support as f32 >= self.min_support_elsewhere
                     && self.is_lowest(plane, table)
             }
         };

@@ -153,7 +153,15 @@ impl Terrain {
         let height_m = self.plane.height_m(point);
         let tolerance_m = bend.tolerance_m + bend.tolerance_per_m * point[0];
         let accepted = match round {
-            Round::Follow => self.can_be_reached(i, j, point[0], height_m, sure, bend),
+            Round::Follow => {
+                let (expected_m, reach_m) = self.expected_m(i, j, point[0], sure, bend);
+                // What stands there hides the ground, which is taken to go on under it: what lies behind is not reached over it.
+                if sure && height_m > expected_m + reach_m {
+                    self.weight[i][j] += 1.0;
+                    self.sum_m[i][j] += expected_m;
+                }
+                (height_m - expected_m).abs() <= reach_m
+            }
             Round::Trim => {
                 let above_m = height_m - self.lift_m(point[0], point[1]);
                 above_m <= tolerance_m && above_m >= -LOWER * tolerance_m
@@ -165,8 +173,9 @@ impl Terrain {
         }
     }
 
-    /// Whether a point can be ground, seen from what is known of its patch or of those between it and the robot.
-    fn can_be_reached(&self, i: usize, j: usize, x_m: f32, height_m: f32, sure: bool, bend: &Bend) -> bool {
+    /// Where the ground is expected, seen from what is known of its patch or of those between it and the robot, and how far it may
+    /// lie above or below.
+    fn expected_m(&self, i: usize, j: usize, x_m: f32, sure: bool, bend: &Bend) -> (f32, f32) {
         let known = |i: usize, j: usize| {
             let weight = *self.weight.get(i)?.get(j)?;
             (weight >= LEAST_WEIGHT).then(|| self.sum_m[i][j] / weight)
@@ -174,13 +183,12 @@ impl Terrain {
         let (nearer, inner) = (i.wrapping_sub(1), if j < ACROSS / 2 { j + 1 } else { j.wrapping_sub(1) });
         let around =
             known(i, j).or_else(|| known(nearer, j)).or_else(|| known(nearer, inner)).or_else(|| known(i, inner));
-        let (expected_m, distance_m) = match around {
-            Some(lift_m) => (lift_m, self.patch_m),
-            None if sure => (0.0, x_m),
-            None => return false,
-        };
         let slope = if sure { bend.max_slope } else { 0.0 };
-        (height_m - expected_m).abs() <= bend.tolerance_m + slope * distance_m
+        match around {
+            Some(lift_m) => (lift_m, bend.tolerance_m + slope * self.patch_m),
+            None if sure => (0.0, bend.tolerance_m + slope * x_m),
+            None => (0.0, -1.0),
+        }
     }
 
     /// The plane under the robot.

@@ -162,7 +162,9 @@ impl ObstacleFinder {
             let [x, y] = place.to_vehicle([points.mean_m[0], points.mean_m[1]]);
             let middle = [x, y, height];
             for i in 0..3 {
-                let half = HALF_LENGTH * libm::sqrtf(points.variance_along(axes[i]));
+                // Where a surface runs through a wide range of distances, they are not spread evenly: it is told to begin no nearer
+                // than half way.
+                let half = (HALF_LENGTH * libm::sqrtf(points.variance_along(axes[i]))).min(0.5 * range_m(points));
                 min_m[i] = min_m[i].min(middle[i] - half);
                 max_m[i] = max_m[i].max(middle[i] + half);
             }
