@@ -49,6 +49,11 @@ impl<const DISPARITIES: usize> DepthTable<DISPARITIES> {
         self.inverse(steps) as f32 * self.scale_m
     }
 
+    /// Focal length times baseline, px m: the distance at a disparity of 1 px.
+    pub fn focal_baseline_px_m(&self) -> f32 {
+        self.scale_m * (INVERSE_ONE / 16.0)
+    }
+
     /// Metres in one unit of [`Self::inverse`].
     pub const fn scale_m(&self) -> f32 {
         self.scale_m

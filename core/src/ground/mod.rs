@@ -31,7 +31,8 @@ const REGIONS: usize = 3;
 /// surfaces that lie on it, wherever they are: bits of ground seen between obstacles count too.
 ///
 /// # Bound
-/// The joining of regions, and up to 25 passes over the table of surfaces.
+/// The joining of regions and up to 25 passes over the table of surfaces, twice if there is no ground at the height of the mount;
+/// the terrain.
 pub struct GroundFinder {
     settings: GroundSettings,
     frame: Option<VehicleFrame>,
@@ -100,8 +101,14 @@ impl GroundFinder {
         geometry: (&DepthTable<DISPARITIES>, &Rays),
     ) -> Option<GroundPlane> {
         let frame = self.frame?;
-        regions.join(surfaces, picture, |surface| self.may_be_ground(surface));
-        let found = self.find(surfaces.table(), regions, &frame);
+        let mut found = None;
+        for height in self.heights() {
+            regions.join(surfaces, picture, |surface| self.may_be_ground(surface, height));
+            found = self.find(surfaces.table(), regions, &frame, height);
+            if found.is_some() {
+                break;
+            }
+        }
         let plane = found.or_else(|| {
             let last = self.last?;
             let age_frames = last.age_frames.saturating_add(1);
@@ -117,6 +124,8 @@ impl GroundFinder {
                     share: self.settings.terrain_share,
                     max_slope: self.terrain_slope,
                     tolerance_m: self.settings.surface_tolerance_m,
+                    tolerance_per_m: self.settings.terrain_noise_px * plane.camera_height_m
+                        / geometry.0.focal_baseline_px_m().max(f32::MIN_POSITIVE),
                 };
                 self.terrain.fit(plane, surfaces, picture, geometry, &bend);
             }
@@ -166,19 +175,27 @@ impl GroundFinder {
         }
     }
 
+    /// What is taken for known about the height of the camera, one try after the other.
+    fn heights(&self) -> impl Iterator<Item = Height> + use<> {
+        let known = self.height_known.then_some(Height::OfMount);
+        let other = if self.height_known { Height::NotOfMount } else { Height::Unknown };
+        known.into_iter().chain([other])
+    }
+
     /// Whether a surface is near-horizontal and where ground can be, for all tilts and heights that are allowed.
-    fn may_be_ground(&self, surface: &Surface) -> bool {
+    fn may_be_ground(&self, surface: &Surface, height: Height) -> bool {
         let [x, y, z] = surface.points.mean_m;
-        let reach = if self.height_known { self.settings.height_tolerance_m } else { f32::INFINITY };
-        let level = if self.height_known { 0.0 } else { f32::NEG_INFINITY };
+        let of_mount = height == Height::OfMount;
+        let reach = if of_mount { self.settings.height_tolerance_m } else { f32::INFINITY };
+        let level = if of_mount { 0.0 } else { f32::NEG_INFINITY };
         let allowance = reach + self.max_slope * libm::sqrtf(x * x + y * y);
         surface.class == SurfaceClass::Horizontal && z <= allowance && z >= level - allowance
     }
 
     /// Whether a surface that may be ground is near enough to say something about the plane.
-    fn tells_plane(&self, surface: &Surface) -> bool {
+    fn tells_plane(&self, surface: &Surface, height: Height) -> bool {
         let [x, y, _] = surface.points.mean_m;
-        x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m && self.may_be_ground(surface)
+        x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m && self.may_be_ground(surface, height)
     }
 
     /// The plane that the most ground lies on, of those that grow from the largest regions, from the last plane and from
@@ -188,26 +205,27 @@ impl GroundFinder {
         table: &[Surface],
         regions: &Regions<SURFACES>,
         frame: &VehicleFrame,
+        height: Height,
     ) -> Option<GroundPlane> {
         let mut best: Option<(f32, GroundPlane)> = None;
         let mut attempt = |seed: Option<GroundPlane>| {
-            let grown = seed.and_then(|seed| self.grow(seed, table, frame));
+            let grown = seed.and_then(|seed| self.grow(seed, table, frame, height));
             if let Some((weight, plane)) = grown.filter(|(weight, _)| best.is_none_or(|(most, _)| *weight > most)) {
                 best = Some((weight, plane));
             }
         };
         attempt(self.last);
-        attempt(self.height_known.then(|| GroundPlane::of_mount(frame)));
+        attempt((height == Height::OfMount).then(|| GroundPlane::of_mount(frame)));
         let mut below = f32::INFINITY;
         for _ in 0..REGIONS {
             // The largest region that was not tried yet; the first of equals.
             let mut largest: Option<Scatter> = None;
             for root in regions.roots() {
-                if !table.get(root).is_some_and(|surface| self.may_be_ground(surface)) {
+                if !table.get(root).is_some_and(|surface| self.may_be_ground(surface, height)) {
                     continue;
                 }
                 let members = regions.members(root).filter_map(|place| table.get(place));
-                let members = members.filter(|surface| self.tells_plane(surface));
+                let members = members.filter(|surface| self.tells_plane(surface, height));
                 let region = members.fold(Scatter::default(), |all, surface| all.joined(&self.weighed(surface)));
                 if region.weight < below && largest.is_none_or(|largest| region.weight > largest.weight) {
                     largest = Some(region);
@@ -222,13 +240,19 @@ impl GroundFinder {
 
     /// Fits the plane anew to all surfaces that lie on it, a few times; `None` if it leaves the limits. Also says how much
     /// lies on it.
-    fn grow(&self, mut plane: GroundPlane, table: &[Surface], frame: &VehicleFrame) -> Option<(f32, GroundPlane)> {
+    fn grow(
+        &self,
+        mut plane: GroundPlane,
+        table: &[Surface],
+        frame: &VehicleFrame,
+        height: Height,
+    ) -> Option<(f32, GroundPlane)> {
         let mut weight = 0.0;
         for round in 0..REFINEMENTS {
             // A first plane may be bent by what is not ground, or come from an earlier frame: it is forgiven more.
             let tolerance = self.settings.fit_tolerance_m * if round == 0 { 2.5 } else { 1.0 };
             let near = |surface: &Surface| plane.height_m(surface.points.mean_m).abs() <= tolerance;
-            let on_it = table.iter().filter(|surface| self.tells_plane(surface) && near(surface));
+            let on_it = table.iter().filter(|surface| self.tells_plane(surface, height) && near(surface));
             let mut support = 0;
             let mut points = Scatter::default();
             for surface in on_it {
@@ -238,7 +262,7 @@ impl GroundFinder {
             plane = GroundPlane { support, ..GroundPlane::through(&points, frame)? };
             weight = points.weight;
         }
-        self.plausible(&plane).then_some((weight, plane))
+        self.plausible(&plane, table, height).then_some((weight, plane))
     }
 
     /// The points of a surface with the weight that their heights deserve. The height of a point on the ground is as
@@ -258,15 +282,55 @@ impl GroundFinder {
         plane.height_m(surface.points.mean_m).abs() <= tolerance
     }
 
-    fn plausible(&self, plane: &GroundPlane) -> bool {
+    fn plausible(&self, plane: &GroundPlane, table: &[Surface], height: Height) -> bool {
         let level = plane.normal[2] >= self.least_upright;
         let expected = self.frame.map_or(0.0, |frame| frame.camera_height_m());
         let off = (plane.camera_height_m - expected).abs();
-        let height =
-            if self.height_known { off <= self.settings.height_tolerance_m } else { plane.camera_height_m > 0.05 };
+        let supported =
+            |permille: f32| plane.support as f32 * self.settings.min_support_permille >= permille * self.min_support;
+        let height = match height {
+            Height::OfMount => off <= self.settings.height_tolerance_m,
+            Height::Unknown => plane.camera_height_m > LEAST_HEIGHT_M,
+            Height::NotOfMount => {
+                plane.camera_height_m > LEAST_HEIGHT_M.max(LEAST_SHARE * expected)
+                    && supported(self.settings.other_height_support_permille)
+                    && self.is_lowest(plane, table)
+            }
+        };
         level && height && plane.support as f32 >= self.min_support
     }
+
+    /// Whether hardly anything lies below a plane: a table has a floor, the ground has none.
+    fn is_lowest(&self, plane: &GroundPlane, table: &[Surface]) -> bool {
+        let below = |surface: &&Surface| {
+            let [x, y, _] = surface.points.mean_m;
+            let near = x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m;
+            near && plane.height_m(surface.points.mean_m) < -self.settings.height_tolerance_m
+        };
+        let pixels: u32 = table.iter().filter(below).map(Surface::pixels).sum();
+        pixels as f32 <= MOST_BELOW * plane.support as f32
+    }
 }
+
+/// What is taken for known about the height of the camera.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Height {
+    /// That of the mount, within its tolerance.
+    OfMount,
+    /// Not that of the mount, though it gives one: a camera that is carried, or a mount that was measured badly.
+    NotOfMount,
+    /// Nothing.
+    Unknown,
+}
+
+/// A camera nearer to the ground sees none of it, metres.
+const LEAST_HEIGHT_M: f32 = 0.05;
+
+/// Least share of the height of the mount at which another plane may lie: what fills the view from near is not the ground.
+const LEAST_SHARE: f32 = 0.33;
+
+/// Largest share of what supports a plane at another height than that of the mount that may lie below it.
+const MOST_BELOW: f32 = 0.05;
 
 impl Default for GroundFinder {
     fn default() -> Self {

@@ -26,10 +26,15 @@ pub struct GroundSettings {
     pub terrain_patch_m: f32,
     /// Steepest ground that is followed, degrees: what rises faster stands on it.
     pub terrain_max_slope_deg: f32,
+    /// Error of a disparity that must be expected, px: what rises less than this makes it is still followed.
+    pub terrain_noise_px: f32,
     /// How much of what is known of the ground in one patch counts in the next: with 0 each patch stands on its own.
     pub terrain_share: f32,
     /// Least number of pixels that must support the plane, per 1000 pixels of the picture.
     pub min_support_permille: f32,
+    /// If there is no ground at the height that the mount promises, a plane at another height is taken for the ground if this many of
+    /// 1000 pixels support it and hardly anything lies below it; with more than 1000 none is.
+    pub other_height_support_permille: f32,
     /// Frames for which the last plane is held when a frame has none; with 0 each frame stands on its own.
     pub hold_frames: u16,
 }
@@ -46,8 +51,10 @@ impl GroundSettings {
         corridor_m: 0.0,
         terrain_patch_m: 0.0,
         terrain_max_slope_deg: 0.0,
+        terrain_noise_px: 0.0,
         terrain_share: 0.0,
         min_support_permille: 0.0,
+        other_height_support_permille: 0.0,
         hold_frames: 0,
     };
 
@@ -65,8 +72,10 @@ impl GroundSettings {
         ConfigError::check("ground.corridor_m", self.corridor_m, 0.1, 1000.0)?;
         ConfigError::check("ground.terrain_patch_m", self.terrain_patch_m, 0.05, 100.0)?;
         ConfigError::check("ground.terrain_max_slope_deg", self.terrain_max_slope_deg, 0.0, 60.0)?;
+        ConfigError::check("ground.terrain_noise_px", self.terrain_noise_px, 0.0, 16.0)?;
         ConfigError::check("ground.terrain_share", self.terrain_share, 0.0, 0.9)?;
         ConfigError::check("ground.min_support_permille", self.min_support_permille, 0.0, 1000.0)?;
+        ConfigError::check("ground.other_height_support_permille", self.other_height_support_permille, 0.0, 2000.0)?;
         ConfigError::check("ground.hold_frames", f32::from(self.hold_frames), 0.0, 1000.0)
     }
 }
@@ -77,14 +86,16 @@ impl Default for GroundSettings {
             max_tilt_deg: 20.0,
             height_tolerance_m: 0.5,
             fit_tolerance_m: 0.05,
-            surface_tolerance_m: 0.08,
+            surface_tolerance_m: 0.06,
             surface_tolerance_per_m: 0.01,
             max_range_m: 25.0,
             corridor_m: 1.0,
             terrain_patch_m: 0.75,
             terrain_max_slope_deg: 25.0,
+            terrain_noise_px: 0.4,
             terrain_share: 0.15,
             min_support_permille: 2.0,
+            other_height_support_permille: 20.0,
             hold_frames: 10,
         }
     }

@@ -56,8 +56,9 @@ pub(crate) struct Bend {
     pub(crate) share: f32,
     /// How far ground may rise or fall in a metre.
     pub(crate) max_slope: f32,
-    /// How far ground may lie off that, metres.
+    /// How far ground may lie off that, metres, and how much farther for each metre ahead: heights are less certain there.
     pub(crate) tolerance_m: f32,
+    pub(crate) tolerance_per_m: f32,
 }
 
 impl Terrain {
@@ -150,11 +151,12 @@ impl Terrain {
         }
         let (i, j) = (ahead as usize, across as usize);
         let height_m = self.plane.height_m(point);
+        let tolerance_m = bend.tolerance_m + bend.tolerance_per_m * point[0];
         let accepted = match round {
             Round::Follow => self.can_be_reached(i, j, point[0], height_m, sure, bend),
             Round::Trim => {
                 let above_m = height_m - self.lift_m(point[0], point[1]);
-                above_m <= bend.tolerance_m && above_m >= -LOWER * bend.tolerance_m
+                above_m <= tolerance_m && above_m >= -LOWER * tolerance_m
             }
         };
         if accepted {

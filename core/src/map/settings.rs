@@ -79,7 +79,7 @@ impl Default for MapSettings {
             free_cover: 0.03,
             free_min_pixels: 4,
             free_max_height_m: 0.2,
-            height_noise_px: 0.9,
+            height_noise_px: 0.8,
             max_range_m: 30.0,
             sector_width_deg: SectorDistances::WIDTH_DEG,
         }

@@ -127,7 +127,10 @@ impl ObstacleFinder {
         match surface.class {
             SurfaceClass::Vertical | SurfaceClass::Obstacle => true,
             SurfaceClass::Ground => false,
-            SurfaceClass::Horizontal => ground.height_m(surface.points.mean_m) >= self.settings.platform_height_m,
+            // Where no ground was seen, this may be it.
+            SurfaceClass::Horizontal => {
+                ground.plane().support > 0 && ground.height_m(surface.points.mean_m) >= self.settings.platform_height_m
+            }
             SurfaceClass::Slanted | SurfaceClass::Undefined => {
                 let half = HALF_LENGTH * libm::sqrtf(surface.points.variance_along(ground.plane().normal));
                 ground.height_m(surface.points.mean_m) + half >= self.settings.min_height_m

@@ -58,7 +58,7 @@ impl Default for ObstacleSettings {
             platform_height_m: 0.6,
             clearance_m: 2.5,
             min_pixels: 40,
-            min_area_m2: 0.05,
+            min_area_m2: 0.02,
             min_size_m: 0.15,
             max_range_m: 40.0,
         }
