@@ -137,9 +137,9 @@ mod tests {
     #[test]
     fn settings_are_usage_and_calibrations_are_input() {
         let out_of_range = ConfigProblem::OutOfRange { min: 5.0, max: 21.0 };
-        let settings = Failure::config(ConfigError::new("matching.window", out_of_range), None);
+        let settings = Failure::config(ConfigError::new("matching.window_width", out_of_range), None);
         assert_eq!(settings.kind.exit_status(), 2);
-        assert!(settings.to_string().contains("set matching.window to 5 or more, 21 at most"));
+        assert!(settings.to_string().contains("set matching.window_width to 5 or more, 21 at most"));
         let calibration = Failure::config(ConfigError::new("calibration.baseline_m", ConfigProblem::Exchanged), None);
         assert_eq!(calibration.kind.exit_status(), 1);
     }

@@ -270,9 +270,10 @@ fn wrong_usage_and_configuration_end_with_2() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("robot.toml");
     for (text, says) in [
-        ("[matching]\nwindow = 8\n", "matching.window"),
-        ("[matching]\nwindow = 99\n", "matching.window"),
-        ("[matching]\nwindov = 7\n", "windov"),
+        ("[matching]\nwindow_width = 8\n", "matching.window_width"),
+        ("[matching]\nwindow_height = 99\n", "matching.window_height"),
+        ("[matching]\nwide_window_width = 7\n", "matching.wide_window_width"),
+        ("[matching]\nwindov_width = 7\n", "windov_width"),
         ("[matching\n", "line 1"),
         ("[wire]\nnode = 16\n", "wire.node"),
     ] {

@@ -78,7 +78,7 @@ fn check_tells_what_a_calibration_and_a_configuration_say() {
     let file = folder.path().join("robot.toml");
     fs::write(&file, "[surfaces]\nvertical_deg = 50.0\n").unwrap();
     let assert = fencepost().arg("check").arg(&file).assert().success();
-    assert.stdout(contains("vertical_deg = 50.0").and(contains("window = 7")).and(contains("memory")));
+    assert.stdout(contains("vertical_deg = 50.0").and(contains("window_width = 9")).and(contains("memory")));
 }
 
 #[test]

@@ -225,13 +225,13 @@ fn settings_come_from_a_file_and_the_command_line() {
     let recording = recording();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("robot.toml");
-    fs::write(&file, "[matching]\ndisparities = 24\nwindow = 9\n[mount]\nheight_m = 1.2\npitch_down_deg = 9.0\nroll_deg = 0.0\n[wire]\nnode = 4\n").unwrap();
+    fs::write(&file, "[matching]\ndisparities = 24\nwindow_width = 11\n[mount]\nheight_m = 1.2\npitch_down_deg = 9.0\nroll_deg = 0.0\n[wire]\nnode = 4\n").unwrap();
     let file = file.to_str().unwrap();
     let run = replay(recording.path(), &["--config", file, "--write", "can"]);
     run.assert(0, &[]);
     let summary = run.summary();
     assert_eq!(summary["settings"]["matching"]["disparities"], 24);
-    assert_eq!(summary["settings"]["matching"]["window"], 9);
+    assert_eq!(summary["settings"]["matching"]["window_width"], 11);
     assert_eq!(summary["wire"]["node"], 4);
     assert!((summary["mount"]["height_m"].as_f64().unwrap() - 1.2).abs() < 1e-6);
     assert!(fs::read_to_string(run.out.join("can.log")).unwrap().contains(" 441#"));

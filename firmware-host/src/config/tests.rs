@@ -1,6 +1,6 @@
 //! Tests of the configuration.
 
-use std::io::Write;
+use std::{collections::BTreeSet, io::Write};
 
 use super::*;
 use crate::live::{BusSettings, RunSettings};
@@ -15,7 +15,7 @@ fn read(text: &str) -> Result<Config, Failure> {
 fn disparities_follow_the_width_unless_chosen() {
     assert_eq!([128, 640, 752, 1242, 2048].map(default_disparities), [16, 80, 96, 128, 128]);
     assert_eq!(read("").unwrap().settings_for(640).matching.disparities, 80);
-    assert_eq!(read("[matching]\nwindow = 9\n").unwrap().settings_for(640).matching.disparities, 80);
+    assert_eq!(read("[matching]\nwindow_width = 11\n").unwrap().settings_for(640).matching.disparities, 80);
     let chosen = read("[matching]\ndisparities = 64\n").unwrap();
     assert_eq!(chosen.settings_for(640).matching.disparities, 64);
 }
@@ -67,6 +67,7 @@ fn every_setting_is_documented_with_its_default() {
     let documented = include_str!("../../../docs/files.md");
     let text = toml::to_string(&Settings::default()).unwrap();
     let mut section = String::new();
+    let mut settings = BTreeSet::new();
     for line in text.lines().filter(|line| !line.is_empty()) {
         if let Some(name) = line.strip_prefix('[') {
             section = name.trim_end_matches(']').to_string();
@@ -77,11 +78,20 @@ fn every_setting_is_documented_with_its_default() {
         let row = documented.lines().filter(|row| row.starts_with('|')).find(|row| row.contains(&name));
         let row = row.unwrap_or_else(|| panic!("{name} is not in docs/files.md"));
         let value = value.trim_end_matches(".0");
+        // One row may have several names, and their defaults in the same order.
+        let [names, defaults] = [1, 2].map(|column| row.split('|').nth(column).unwrap().split(',').map(str::trim));
+        let default =
+            names.zip(defaults).find(|(other, _)| *other == name).map(|(_, default)| default.trim_matches('`'));
         // The number of disparities follows the width of the pictures.
-        assert!(
-            row.contains(value) || name.contains(".disparities"),
-            "{name} is {value}, but docs/files.md says: {row}"
-        );
+        let is_same = default == Some(value) || name == "`matching.disparities`";
+        assert!(is_same, "{name} is {value}, but docs/files.md says: {row}");
+        settings.insert(name);
+    }
+    let sections: BTreeSet<_> = settings.iter().filter_map(|name| Some(name.split_once('.')?.0)).collect();
+    let rows = documented.lines().filter_map(|row| row.strip_prefix("| ")?.split('|').next());
+    for name in rows.flat_map(|names| names.split(',')).map(str::trim) {
+        let is_setting = name.split_once('.').is_some_and(|(section, _)| sections.contains(section));
+        assert!(!is_setting || settings.contains(name), "{name} is in docs/files.md, but there is no such setting");
     }
     let others = [
         ("run", toml::to_string(&RunSettings::default())),
@@ -104,11 +114,11 @@ fn every_setting_is_documented_with_its_default() {
 
 #[test]
 fn mistakes_name_the_line() {
-    let unknown = read("[matching]\nwindow = 7\nwindov = 9\n").unwrap_err();
+    let unknown = read("[matching]\nwindow_width = 7\nwindov_width = 9\n").unwrap_err();
     assert_eq!(unknown.kind.exit_status(), 2);
     assert!(unknown.place.as_ref().is_some_and(|p| p.ends_with("line 3")), "{unknown}");
-    assert!(unknown.what.contains("windov"), "{unknown}");
-    for text in ["[matching]\nwindow = \"wide\"\n", "[matching\n", "[nonsense]\n", "a = [\n", "\u{0}"] {
+    assert!(unknown.what.contains("windov_width"), "{unknown}");
+    for text in ["[matching]\nwindow_width = \"wide\"\n", "[matching\n", "[nonsense]\n", "a = [\n", "\u{0}"] {
         assert_eq!(read(text).unwrap_err().kind.exit_status(), 2, "{text}");
     }
 }
@@ -116,8 +126,8 @@ fn mistakes_name_the_line() {
 #[test]
 fn every_mistake_is_told_at_once_with_its_line() {
     let text = r#"[matching]
-windov = 9
-window = 8
+windov_width = 9
+window_width = 8
 texture = "rough"
 [wire]
 node = 17
@@ -151,8 +161,8 @@ widht = 3
     let mut found: Vec<(usize, &str)> = mistakes.iter().map(|m| (m.line.unwrap(), m.field.as_str())).collect();
     found.sort_unstable();
     let expected = [
-        (2, "matching.windov"),
-        (3, "matching.window"),
+        (2, "matching.windov_width"),
+        (3, "matching.window_width"),
         (4, "matching.texture"),
         (6, "wire.node"),
         (7, "wire.format"),
@@ -174,12 +184,13 @@ widht = 3
     ];
     assert_eq!(found, expected, "{mistakes:#?}");
     let mend = |field: &str| mistakes.iter().find(|m| m.field == field).unwrap().mend.as_str();
-    assert_eq!((mend("matching.windov"), mend("run.priorty")), ("write `window`", "write `priority`"));
+    assert_eq!((mend("matching.windov_width"), mend("run.priorty")), ("write `window_width`", "write `priority`"));
 }
 
 #[test]
 fn several_mistakes_in_the_text_itself_are_told_at_once() {
-    let (_, mistakes) = Config::parse("[matching\nwindow = = 7\n[wire]\nnode = 1\nnode = 2\n", Path::new(""), true);
+    let (_, mistakes) =
+        Config::parse("[matching\nwindow_width = = 7\n[wire]\nnode = 1\nnode = 2\n", Path::new(""), true);
     let lines: Vec<_> = mistakes.iter().filter_map(|mistake| mistake.line).collect();
     assert!(lines.contains(&1) && lines.contains(&2) && lines.contains(&5), "{mistakes:#?}");
 }
@@ -195,8 +206,9 @@ fn the_rig_that_is_shipped_has_no_mistake_but_the_calibration_that_everybody_mak
 
 #[test]
 fn a_recording_is_replayed_with_the_file_of_a_rig_whose_cameras_are_elsewhere() {
-    let config = read("[matching]\nwindow = 9\n[[pair]]\ncalibration = [\"none.yaml\"]\n[pair.camera]\n").unwrap();
-    assert_eq!(config.settings_for(640).matching.window, 9);
+    let config =
+        read("[matching]\nwindow_width = 11\n[[pair]]\ncalibration = [\"none.yaml\"]\n[pair.camera]\n").unwrap();
+    assert_eq!(config.settings_for(640).matching.window_width, 11);
     assert!(config.rig.pairs.is_empty());
 }
 
