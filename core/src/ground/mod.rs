@@ -39,9 +39,6 @@ pub struct GroundFinder {
     height_known: bool,
     min_support: f32,
     min_support_elsewhere: f32,
-    /// How far a point moves along its ray for the error of a disparity that must be expected, in parts of its distance and for each
-    /// metre of it.
-    noise_per_m: f32,
     /// Tangents of the largest tilt and of the steepest ground, cosine of the largest tilt.
     max_slope: f32,
     terrain_slope: f32,
@@ -59,7 +56,6 @@ impl GroundFinder {
             height_known: false,
             min_support: 0.0,
             min_support_elsewhere: 0.0,
-            noise_per_m: 0.0,
             max_slope: 0.0,
             terrain_slope: 0.0,
             least_upright: 0.0,
@@ -109,7 +105,6 @@ impl GroundFinder {
     ) -> Option<GroundPlane> {
         let frame = self.frame?;
         let focal_baseline_px_m = geometry.0.focal_baseline_px_m().max(f32::MIN_POSITIVE);
-        self.noise_per_m = self.settings.plane_noise_px / focal_baseline_px_m;
         let mut found = None;
         for height in self.heights() {
             regions.join(surfaces, picture, |surface| self.may_be_ground(surface, height));
@@ -285,7 +280,10 @@ impl GroundFinder {
         let weight = surface.points.weight / ((1.0 + x * x + y * y) * (1.0 + aside * aside));
         let camera_m = self.frame.map_or([0.0; 3], |frame| frame.point([0.0; 3]));
         let ray: [f32; 3] = core::array::from_fn(|i| surface.points.mean_m[i] - camera_m[i]);
-        let shift = self.noise_per_m * libm::sqrtf(ray.iter().map(|r| r * r).sum());
+        // What is seen of it is how far the points lie off their plane.
+        let [nx, ny, nz] = surface.normal;
+        let across_m = (nx * ray[0] + ny * ray[1] + nz * ray[2]).abs();
+        let shift = if across_m > LEAST_HEIGHT_M { surface.rms_m / across_m } else { 0.0 };
         let noise = ray.map(|r| r * shift);
         let c = surface.points.covariance;
         let covariance = SymmetricMatrix3 {

@@ -18,9 +18,6 @@ pub struct GroundSettings {
     pub surface_tolerance_m: f32,
     /// Allowance on top of it for each metre of range, metres: distances are less certain there, and the ground bends.
     pub surface_tolerance_per_m: f32,
-    /// Error of a disparity that must be expected on the ground, px: what it adds to the spread of a surface is taken out before the
-    /// plane is fitted.
-    pub plane_noise_px: f32,
     /// Surfaces farther away say nothing about the plane, metres: roads bend there, and their heights are uncertain.
     pub max_range_m: f32,
     /// Surfaces this far to the side count half, metres: the plane is that of the ground ahead, not that of the verges.
@@ -48,7 +45,6 @@ impl GroundSettings {
         max_tilt_deg: 0.0,
         height_tolerance_m: 0.0,
         fit_tolerance_m: 0.0,
-        plane_noise_px: 0.0,
         surface_tolerance_m: 0.0,
         surface_tolerance_per_m: 0.0,
         max_range_m: 0.0,
@@ -72,7 +68,6 @@ impl GroundSettings {
         ConfigError::check("ground.fit_tolerance_m", self.fit_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.surface_tolerance_m", self.surface_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.surface_tolerance_per_m", self.surface_tolerance_per_m, 0.0, 0.5)?;
-        ConfigError::check("ground.plane_noise_px", self.plane_noise_px, 0.0, 4.0)?;
         ConfigError::check("ground.max_range_m", self.max_range_m, 1.0, 1000.0)?;
         ConfigError::check("ground.corridor_m", self.corridor_m, 0.1, 1000.0)?;
         ConfigError::check("ground.terrain_patch_m", self.terrain_patch_m, 0.05, 100.0)?;
@@ -91,7 +86,6 @@ impl Default for GroundSettings {
             max_tilt_deg: 20.0,
             height_tolerance_m: 0.5,
             fit_tolerance_m: 0.05,
-            plane_noise_px: 0.65,
             surface_tolerance_m: 0.06,
             surface_tolerance_per_m: 0.01,
             max_range_m: 25.0,
