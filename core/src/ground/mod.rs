@@ -229,7 +229,7 @@ impl GroundFinder {
                 }
                 let members = regions.members(root).filter_map(|place| table.get(place));
                 let members = members.filter(|surface| self.tells_plane(surface, height));
-                let region = members.fold(Scatter::default(), |all, surface| all.joined(&self.weighed(surface)));
+                let region = members.fold(Scatter::default(), |all, surface| all.joined(&self.weighed(surface, 0.0)));
                 if region.weight < below && largest.is_none_or(|largest| region.weight > largest.weight) {
                     largest = Some(region);
                 }
@@ -256,11 +256,12 @@ impl GroundFinder {
             let tolerance = self.settings.fit_tolerance_m * if round == 0 { 2.5 } else { 1.0 };
             let near = |surface: &Surface| plane.height_m(surface.points.mean_m).abs() <= tolerance;
             let on_it = table.iter().filter(|surface| self.tells_plane(surface, height) && near(surface));
+            let noise_per_m = self.noise_per_m(table.iter().filter(|surface| self.tells_plane(surface, height)));
             let mut support = 0;
             let mut points = Scatter::default();
             for surface in on_it {
                 support += surface.pixels();
-                points = points.joined(&self.weighed(surface));
+                points = points.joined(&self.weighed(surface, noise_per_m));
             }
             plane = GroundPlane { support, ..GroundPlane::through(&points, frame)? };
             weight = points.weight;
@@ -274,16 +275,13 @@ impl GroundFinder {
     /// the slope of the ray falls with it), so the weight falls with the square; and it falls to the sides, where the road does not
     /// lead. The error of a disparity moves a point along its ray, down when it moves away: taken for the spread of the surface, it
     /// would tilt the plane away from the camera.
-    fn weighed(&self, surface: &Surface) -> Scatter {
+    fn weighed(&self, surface: &Surface, noise_per_m: f32) -> Scatter {
         let [x, y, _] = surface.points.mean_m;
         let aside = y / self.settings.corridor_m;
         let weight = surface.points.weight / ((1.0 + x * x + y * y) * (1.0 + aside * aside));
         let camera_m = self.frame.map_or([0.0; 3], |frame| frame.point([0.0; 3]));
         let ray: [f32; 3] = core::array::from_fn(|i| surface.points.mean_m[i] - camera_m[i]);
-        // What is seen of it is how far the points lie off their plane.
-        let [nx, ny, nz] = surface.normal;
-        let across_m = (nx * ray[0] + ny * ray[1] + nz * ray[2]).abs();
-        let shift = if across_m > LEAST_HEIGHT_M { surface.rms_m / across_m } else { 0.0 };
+        let shift = noise_per_m * libm::sqrtf(ray.iter().map(|r| r * r).sum());
         let noise = ray.map(|r| r * shift);
         let c = surface.points.covariance;
         let covariance = SymmetricMatrix3 {
@@ -295,6 +293,23 @@ impl GroundFinder {
             zz: c.zz - noise[2] * noise[2],
         };
         Scatter { weight, covariance, ..surface.points }
+    }
+
+    /// How far disparities that err by what is seen of it move a point along its ray, in parts of its distance and for each metre of
+    /// it: the mean over `surfaces` of how far their points lie off their planes.
+    fn noise_per_m<'a>(&self, surfaces: impl Iterator<Item = &'a Surface>) -> f32 {
+        let camera_m = self.frame.map_or([0.0; 3], |frame| frame.point([0.0; 3]));
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for surface in surfaces {
+            let ray: [f32; 3] = core::array::from_fn(|i| surface.points.mean_m[i] - camera_m[i]);
+            let range_m = libm::sqrtf(ray.iter().map(|r| r * r).sum());
+            let across_m = (0..3).map(|i| surface.normal[i] * ray[i]).sum::<f32>().abs();
+            if across_m > LEAST_HEIGHT_M {
+                sum += surface.points.weight * surface.rms_m / (across_m * range_m);
+                weight += surface.points.weight;
+            }
+        }
+        if weight > 0.0 { sum / weight } else { 0.0 }
     }
 
     fn lies_on(&self, plane: &GroundPlane, surface: &Surface) -> bool {

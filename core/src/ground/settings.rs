@@ -91,7 +91,7 @@ impl Default for GroundSettings {
             max_range_m: 25.0,
             corridor_m: 1.0,
             terrain_patch_m: 0.75,
-            terrain_max_slope_deg: 25.0,
+            terrain_max_slope_deg: 20.0,
             terrain_noise_px: 0.4,
             terrain_share: 0.15,
             min_support_permille: 2.0,

@@ -180,12 +180,19 @@ impl Terrain {
             let weight = *self.weight.get(i)?.get(j)?;
             (weight >= LEAST_WEIGHT).then(|| self.sum_m[i][j] / weight)
         };
-        let (nearer, inner) = (i.wrapping_sub(1), if j < ACROSS / 2 { j + 1 } else { j.wrapping_sub(1) });
-        let around =
-            known(i, j).or_else(|| known(nearer, j)).or_else(|| known(nearer, inner)).or_else(|| known(i, inner));
+        let inner = if j < ACROSS / 2 { j + 1 } else { j.wrapping_sub(1) };
+        // The patch itself, those between it and the robot, and at last the nearest one before it: what hides the ground hides
+        // more of it the farther it reaches.
+        let beside = |lift_m| (lift_m, 1);
+        let around = known(i, j)
+            .or_else(|| known(i.wrapping_sub(1), j))
+            .or_else(|| known(i.wrapping_sub(1), inner))
+            .or_else(|| known(i, inner))
+            .map(beside)
+            .or_else(|| (2..=i).find_map(|back| Some((known(i - back, j)?, back))));
         let slope = if sure { bend.max_slope } else { 0.0 };
         match around {
-            Some(lift_m) => (lift_m, bend.tolerance_m + slope * self.patch_m),
+            Some((lift_m, patches)) => (lift_m, bend.tolerance_m + slope * patches as f32 * self.patch_m),
             None if sure => (0.0, bend.tolerance_m + slope * x_m),
             None => (0.0, -1.0),
         }
