@@ -18,7 +18,8 @@ use super::{
 const PERIOD: Duration = Duration::from_millis(400);
 /// An emulated processor does not keep up with the pictures where it counts bits: the paper's plain matching does for these tests.
 const SETTINGS: &str = "[run]\ndeadline_ms = 10000\nstale_ms = 10000\npriority = 0\nhold_ms = 100\n\
-                        [matching]\ncost = \"absolute-differences\"\nwindow_width = 7\nwide_window_width = 0\n";
+                        [matching]\ncost = \"absolute-differences\"\nwindow_width = 7\nwide_window_width = 0\n\
+                        texture = 16\nuniqueness_percent = 8\n[validate]\nmin_surface_px = 200\n";
 
 type Spoil = fn(&mut FaultyCamera<PacedCamera<MemoryCamera>>);
 
