@@ -162,9 +162,12 @@ fn course() -> SceneOptions {
 /// What was made of the things of the course and the ground between them.
 #[derive(Clone, Debug, Default)]
 struct Found {
-    /// Things that are in plain view of both cameras, and those of them with an obstacle cell within one cell.
+    /// Things that are in plain view of both cameras down to the ground, and those of them with an obstacle cell within one cell.
     things: usize,
     things_found: usize,
+    /// The same for things whose foot is hidden by a crest: of them only a part shows, which may be as low as a bump of the ground.
+    tops: usize,
+    tops_found: usize,
     /// Where the others are, metres.
     missed_m: Vec<(f32, f32)>,
     /// Obstacle cells with no thing within one cell, metres, wherever they are.
@@ -185,14 +188,23 @@ impl Found {
         let truth = scene.truth(frame).cells;
         let at = |i: i16, j: i16| map.geometry.index(i, j).map(|index| map.cells[index].state);
         let near = |i: i16, j: i16, is: &dyn Fn(i16, i16) -> bool| (-1..=1).any(|a| (-1..=1).any(|b| is(i + a, j + b)));
-        let places: Vec<_> = (0..COURSE.len()).filter_map(|thing| scene.course_cell(thing, frame)).collect();
-        for (i, j) in &places {
-            let in_view = near(*i, *j, &|a, b| truth.get(a, b) == TruthCell::Obstacle);
-            let is_found = near(*i, *j, &|a, b| at(a, b) == Some(CellState::Obstacle));
-            self.things += usize::from(in_view);
-            self.things_found += usize::from(in_view && is_found);
-            if in_view && !is_found {
-                self.missed_m.push(map.geometry.centre_m(*i, *j));
+        let mut places = Vec::new();
+        for thing in 0..COURSE.len() {
+            let Some((i, j)) = scene.course_cell(thing, frame) else { continue };
+            places.push((i, j));
+            if !near(i, j, &|a, b| truth.get(a, b) == TruthCell::Obstacle) {
+                continue;
+            }
+            let is_found = near(i, j, &|a, b| at(a, b) == Some(CellState::Obstacle));
+            if scene.course_foot_is_hidden(thing, frame) {
+                self.tops += 1;
+                self.tops_found += usize::from(is_found);
+                continue;
+            }
+            self.things += 1;
+            self.things_found += usize::from(is_found);
+            if !is_found {
+                self.missed_m.push(map.geometry.centre_m(i, j));
             }
         }
         for (index, cell) in map.cells.iter().enumerate() {
@@ -228,14 +240,18 @@ fn judge(what: &str, all: impl Iterator<Item = SceneOptions>, reached: &Reached)
         }
         total.things += found.things;
         total.things_found += found.things_found;
+        total.tops += found.tops;
+        total.tops_found += found.tops_found;
         total.clear += found.clear;
         total.clear_called_free += found.clear_called_free;
         total.false_m.extend(found.false_m);
     }
     say!(
-        "{what}: {} of {} things found, {} false obstacle cells, {} of {} clear cells free",
+        "{what}: {} of {} things found, and {} of {} whose foot a crest hides; {} false obstacle cells, {} of {} clear cells free",
         total.things_found,
         total.things,
+        total.tops_found,
+        total.tops,
         total.false_m.len(),
         total.clear_called_free,
         total.clear

@@ -183,13 +183,20 @@ impl Terrain {
         let inner = if j < ACROSS / 2 { j + 1 } else { j.wrapping_sub(1) };
         // The patch itself, those between it and the robot, and at last the nearest one before it: what hides the ground hides
         // more of it the farther it reaches.
-        let beside = |lift_m| (lift_m, 1);
+        // It may rise and fall as much as drivable ground does in the frame; ground that is not known to be some goes on as it was.
+        // So what the plane itself falls from there to here is taken out.
+        let [nx, ny, nz] = self.plane.normal;
+        let aside = if j < ACROSS / 2 { -ny } else { ny };
+        let level = |lift_m: f32, across: f32, along: usize| {
+            let fall_m = if sure { (along as f32 * nx + across * aside) / nz * self.patch_m } else { 0.0 };
+            (lift_m + fall_m, along.max(1))
+        };
         let around = known(i, j)
-            .or_else(|| known(i.wrapping_sub(1), j))
-            .or_else(|| known(i.wrapping_sub(1), inner))
-            .or_else(|| known(i, inner))
-            .map(beside)
-            .or_else(|| (2..=i).find_map(|back| Some((known(i - back, j)?, back))));
+            .map(|lift_m| (lift_m, 1))
+            .or_else(|| Some(level(known(i.wrapping_sub(1), j)?, 0.0, 1)))
+            .or_else(|| Some(level(known(i.wrapping_sub(1), inner)?, 1.0, 1)))
+            .or_else(|| Some(level(known(i, inner)?, 1.0, 0)))
+            .or_else(|| (2..=i).find_map(|back| Some(level(known(i - back, j)?, 0.0, back))));
         let slope = if sure { bend.max_slope } else { 0.0 };
         match around {
             Some((lift_m, patches)) => (lift_m, bend.tolerance_m + slope * patches as f32 * self.patch_m),

@@ -1,6 +1,6 @@
 //! From classified surfaces to cells.
 
-use super::{Cell, CellState, MapGeometry, MapSettings, ObstacleMap, UnknownReason, cells::floor, shadow};
+use super::{Cell, CellState, MapGeometry, MapSettings, ObstacleMap, UnknownReason, cells::floor, shadow, smear};
 use crate::{
     disparity::{DisparityPicture, Reason},
     error::ConfigError,
@@ -172,6 +172,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             // Cannot fail: `configure` made sure that there is room.
             let _ = map.cells.push(verdict(&self.evidence[index], cell));
         }
+        smear::take_out(map, view.place, &self.settings);
         shadow::mark(map, view.place);
     }
 
@@ -199,30 +200,35 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let step = view.rays.along_row;
         let rise = |d: [f32; 3]| d[0] * plane.normal[0] + d[1] * plane.normal[1] + d[2] * plane.normal[2];
         let (mut climb, climb_step) = (rise(direction), rise(step));
-        let (mut current, mut role, mut noise) = (0, Role::Nothing, 0.0);
+        let (mut current, mut role, mut noise_per_m2) = (0, Role::Nothing, 0.0);
         for (pixel, &label) in picture.row(y)[x0..end].iter().zip(labels) {
             if label != current {
                 current = label;
                 let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(first + i));
                 role = surface.map_or(Role::Nothing, Role::of);
-                noise = surface.map_or(0.0, |surface| self.height_noise_m(surface, view, ground, direction));
+                noise_per_m2 =
+                    surface.map_or(0.0, |surface| self.height_noise_per_m2(surface, view, ground, direction));
             }
             if role != Role::Nothing {
                 let z = view.depth.distance_m(pixel.steps());
                 let x = view.rays.origin_m[0] + z * direction[0];
                 let y = view.rays.origin_m[1] + z * direction[1];
                 let height = camera_height + z * climb - ground.lift_m(x, y);
+                let noise = noise_per_m2 * (x * x + y * y);
                 let [i, j] = view.place.to_vehicle([x, y]).map(|metres| floor(metres * per_cell));
                 if let Some(evidence) = self.settings.geometry.index(i, j).map(|i| &mut self.evidence[i]) {
                     let too_high = height > self.settings.free_max_height_m.max(noise);
-                    match role {
-                        Role::Obstacle | Role::Ground if height >= min_height.max(noise) && height <= clearance => {
-                            evidence.obstacle = evidence.obstacle.saturating_add(1);
-                            evidence.height_dm = evidence.height_dm.max((height * 10.0) as u8);
-                        }
-                        Role::Ground if !too_high => evidence.ground = evidence.ground.saturating_add(1),
-                        _ if too_high && height <= clearance => evidence.unclear = evidence.unclear.saturating_add(1),
-                        _ => {}
+                    // Ground that lies deeper than expected is a drop, or the top of what stands below.
+                    let too_low = height < -self.settings.free_max_height_m.max(noise);
+                    // What stands upright is an obstacle as soon as it does not pass for ground.
+                    let stands = too_high && (role == Role::Obstacle || role == Role::Ground && height >= min_height);
+                    if stands && height <= clearance {
+                        evidence.obstacle = evidence.obstacle.saturating_add(1);
+                        evidence.height_dm = evidence.height_dm.max((height * 10.0) as u8);
+                    } else if too_low || too_high && height <= clearance {
+                        evidence.unclear = evidence.unclear.saturating_add(1);
+                    } else if role == Role::Ground && !too_high {
+                        evidence.ground = evidence.ground.saturating_add(1);
                     }
                 }
             }
@@ -233,9 +239,10 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         }
     }
 
-    /// How far the height of a pixel of a surface may be off, metres: the error of its distance, times how fast its ray drops
-    /// towards the ground there. A slope that rises towards the robot is seen at a larger angle, and its heights are less certain.
-    fn height_noise_m<const DISPARITIES: usize>(
+    /// How far the height of a pixel of a surface may be off, metres for each square metre of its range squared: the error of its
+    /// distance, times how fast its ray drops towards the ground there. A slope that rises towards the robot is seen at a larger
+    /// angle, and its heights are less certain.
+    fn height_noise_per_m2<const DISPARITIES: usize>(
         &self,
         surface: &Surface,
         view: &View<'_, DISPARITIES>,
@@ -248,9 +255,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let slope_aside = (ground.lift_m(x, y + half) - ground.lift_m(x, y - half)) / SLOPE_STEP_M;
         let [nx, ny, nz] = ground.plane().normal;
         let drop = direction[0] * (nx - slope_ahead) + direction[1] * (ny - slope_aside) + direction[2] * nz;
-        let range_square = x * x + y * y;
-        let distance_noise = self.settings.height_noise_px * range_square / (view.pair.focal_px * view.pair.baseline_m);
-        distance_noise * drop.abs()
+        self.settings.height_noise_px * drop.abs() / (view.pair.focal_px * view.pair.baseline_m)
     }
 
     /// What the votes make of a cell.
@@ -281,7 +286,8 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let need_obstacle =
             (self.settings.obstacle_cover * obstacle_area).max(f32::from(self.settings.obstacle_min_pixels));
         let need_free = (self.settings.free_cover * across * along).max(f32::from(self.settings.free_min_pixels));
-        if f32::from(evidence.obstacle) >= need_obstacle {
+        let for_obstacle = f32::from(evidence.obstacle) + self.settings.unclear_share * f32::from(evidence.unclear);
+        if for_obstacle >= need_obstacle {
             let (pixels, height_dm) = (evidence.obstacle, evidence.height_dm);
             return Cell { state: CellState::Obstacle, pixels, height_dm, ..Cell::CERTAIN };
         }

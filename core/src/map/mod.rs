@@ -6,6 +6,7 @@ mod merge;
 mod sectors;
 mod settings;
 mod shadow;
+mod smear;
 
 pub(crate) use builder::{Evidence, Vote};
 pub use builder::{MapBuilder, View};

@@ -23,6 +23,14 @@ pub struct MapSettings {
     /// Error of a disparity that must be expected at worst, px: what is not higher above the ground than this makes it is not told
     /// from the ground.
     pub height_noise_px: f32,
+    /// How much a pixel counts for an obstacle that is too high for the ground but lies on a surface that is none, such as the top of
+    /// a thing: many of them are one, a few are not.
+    pub unclear_share: f32,
+    /// An obstacle cell with less than this share of the pixels of one nearer in the same direction is what the matching window
+    /// smears of that; 0 for never.
+    pub smear_share: f32,
+    /// How many cells behind an obstacle it smears, at most 8.
+    pub smear_cells: u8,
     /// Cells farther away from the camera are not told, metres.
     pub max_range_m: f32,
     /// Width of each of the sectors around straight ahead, degrees; 18 is a full circle.
@@ -39,6 +47,9 @@ impl MapSettings {
         free_min_pixels: 0,
         free_max_height_m: 0.0,
         height_noise_px: 0.0,
+        unclear_share: 0.0,
+        smear_share: 0.0,
+        smear_cells: 0,
         max_range_m: 0.0,
         sector_width_deg: 0.0,
     };
@@ -65,6 +76,9 @@ impl MapSettings {
         ConfigError::check("map.free_min_pixels", f32::from(self.free_min_pixels), 1.0, 10_000.0)?;
         ConfigError::check("map.free_max_height_m", self.free_max_height_m, 0.01, 2.0)?;
         ConfigError::check("map.height_noise_px", self.height_noise_px, 0.0, 16.0)?;
+        ConfigError::check("map.unclear_share", self.unclear_share, 0.0, 1.0)?;
+        ConfigError::check("map.smear_share", self.smear_share, 0.0, 1.0)?;
+        ConfigError::check("map.smear_cells", f32::from(self.smear_cells), 0.0, 8.0)?;
         ConfigError::check("map.max_range_m", self.max_range_m, 0.1, 1000.0)?;
         ConfigError::check("map.sector_width_deg", self.sector_width_deg, 0.5, 18.0)
     }
@@ -75,11 +89,14 @@ impl Default for MapSettings {
         Self {
             geometry: MapGeometry::default(),
             obstacle_cover: 0.1,
-            obstacle_min_pixels: 8,
+            obstacle_min_pixels: 20,
             free_cover: 0.03,
             free_min_pixels: 4,
             free_max_height_m: 0.2,
             height_noise_px: 0.8,
+            unclear_share: 0.25,
+            smear_share: 0.25,
+            smear_cells: 2,
             max_range_m: 30.0,
             sector_width_deg: SectorDistances::WIDTH_DEG,
         }

@@ -89,21 +89,22 @@ fn plain_votes(world: &World, made: &Made) -> Vec<Votes> {
         // Nearness to any limit that decides, metres; the table of distances is within 3e-5 of the distance.
         let near = 5.0e-5 * z;
         let edge = |x: f64| ((x / size).round() * size - x).abs() < near;
-        let noise = plain_noise(world, made, surface, (u, v));
+        let noise = plain_noise(world, made, surface, (u, v)).map(|per_m2| per_m2 * (p.x * p.x + p.y * p.y));
         let [least_height, free_max] = [obstacles.min_height_m, made.settings.free_max_height_m]
             .map(|limit| noise.map(|noise| f64::from(limit).max(noise)));
         let clearance = f64::from(obstacles.clearance_m);
         let within = |[low, high]: [f64; 2]| height > low - near && height < high + near;
         let at = world.to_vehicle(p);
-        let limits = [least_height, free_max, [clearance; 2]];
+        let low = [-free_max[1], -free_max[0]];
+        let limits = [least_height, free_max, [clearance; 2], low];
         let uncertain = edge(at.x) || edge(at.y) || limits.into_iter().any(within);
         let on_ground = surface.class == SurfaceClass::Ground;
-        let may_stand = on_ground || surface.class == SurfaceClass::Obstacle;
+        let stands = surface.class == SurfaceClass::Obstacle && height > free_max[1];
         let kind = if height > clearance {
             None
-        } else if may_stand && height >= least_height[1] {
+        } else if stands || on_ground && height >= least_height[1] {
             Some(0)
-        } else if height > free_max[1] {
+        } else if height > free_max[1] || height < low[0] {
             Some(2)
         } else {
             on_ground.then_some(1)
@@ -125,8 +126,8 @@ fn plain_votes(world: &World, made: &Made) -> Vec<Votes> {
     votes
 }
 
-/// Least and greatest error that the height of a pixel of a surface must be expected to have, over the pixels of its tile in its
-/// row: the error of the distance to the surface times the rate at which a ray there nears the ground.
+/// Least and greatest error that the height of a pixel of a surface must be expected to have, for each square metre of its range
+/// squared, over the pixels of its tile in its row: the error of the distance times the rate at which a ray there nears the ground.
 fn plain_noise(world: &World, made: &Made, surface: &Surface, (u, v): (usize, usize)) -> [f64; 2] {
     let terrain = made.stages.ground.terrain();
     let [x, y, _] = surface.points.mean_m;
@@ -136,9 +137,8 @@ fn plain_noise(world: &World, made: &Made, surface: &Surface, (u, v): (usize, us
     };
     let normal =
         Point::from(terrain.plane().normal.map(f64::from)) - Point::new(rise((1.0, 0.0)), rise((0.0, 1.0)), 0.0);
-    let range_square = f64::from(x).powi(2) + f64::from(y).powi(2);
-    let distance_error = f64::from(made.settings.height_noise_px) * range_square
-        / (f64::from(PAIR.focal_px) * f64::from(PAIR.baseline_m));
+    let distance_error =
+        f64::from(made.settings.height_noise_px) / (f64::from(PAIR.focal_px) * f64::from(PAIR.baseline_m));
     let first = u - u % TILE;
     let ends =
         [first, first + TILE - 1].map(|u| distance_error * normal.dot(&world.direction(u as f64, v as f64)).abs());
@@ -178,7 +178,8 @@ fn cells_are_those_of_a_plain_count_of_votes() {
     ];
     let small = MapGeometry { cell_size_mm: 250, x_first: 2, x_count: 50, y_first: -20, y_count: 50 };
     for (world, geometry) in worlds.iter().flat_map(|w| [(w, MapGeometry::default()), (w, small)]) {
-        let settings = MapSettings { geometry, max_range_m: 14.0, ..MapSettings::default() };
+        // What obstacles smear is looked at for itself.
+        let settings = MapSettings { geometry, max_range_m: 14.0, smear_share: 0.0, ..MapSettings::default() };
         let made = make(world, settings, &GroundSettings::default());
         assert!(made.ground.is_some());
         let votes = plain_votes(world, &made);
@@ -199,10 +200,11 @@ fn cells_are_those_of_a_plain_count_of_votes() {
                 assert_eq!(cell.state, CellState::Unknown(UnknownReason::OutsideView), "{what}");
                 continue;
             };
-            let decide = |obstacle: u32, ground: u32, against: u32| {
-                if f64::from(obstacle) >= need_obstacle {
+            let share = f64::from(settings.unclear_share);
+            let decide = |obstacle: u32, ground: u32, unclear: u32| {
+                if f64::from(obstacle) + share * f64::from(unclear) >= need_obstacle {
                     Some(CellState::Obstacle)
-                } else if f64::from(ground) >= need_free && f64::from(against) < 0.5 * need_obstacle {
+                } else if f64::from(ground) >= need_free && f64::from(obstacle + unclear) < 0.5 * need_obstacle {
                     Some(CellState::Free)
                 } else {
                     None
@@ -210,10 +212,10 @@ fn cells_are_those_of_a_plain_count_of_votes() {
             };
             let (l, m) = (votes.least, votes.most);
             let outcomes = [
-                decide(l[0], l[1], m[0] + m[2]),
-                decide(l[0], m[1], l[0] + l[2]),
-                decide(m[0], l[1], m[0] + m[2]),
-                decide(m[0], m[1], l[0] + l[2]),
+                decide(l[0], l[1], l[2]),
+                decide(l[0], m[1], l[2]),
+                decide(m[0], l[1], m[2]),
+                decide(m[0], m[1], m[2]),
             ];
             if outcomes.iter().any(|o| *o != outcomes[0]) {
                 counts[3] += 1;
@@ -506,6 +508,41 @@ fn cells_behind_obstacles_are_hidden_as_rays_say() {
 }
 
 #[test]
+fn obstacles_smear_cells_with_few_pixels_right_behind_them() {
+    let settings = MapSettings::default();
+    let geometry = MapGeometry { cell_size_mm: 500, x_first: 0, x_count: 40, y_first: -20, y_count: 40 };
+    // A thing in cell (10, j) with 400 pixels, and what lies `behind` it in its direction.
+    let left_over = |j: i16, behind: &[(i16, u16)], settings: &MapSettings| {
+        let mut map = ObstacleMap::<CELLS> { geometry, cells: heapless::Vec::new() };
+        for _ in 0..geometry.len() {
+            map.cells.push(Cell::default()).unwrap();
+        }
+        let (x, y) = geometry.centre_m(10, j);
+        let along = |cells: i16| {
+            let far = 1.0 + f32::from(cells) * 0.5 / x;
+            geometry.index((x * far / 0.5).floor() as i16, (y * far / 0.5).floor() as i16).unwrap()
+        };
+        for (cells, pixels) in behind.iter().chain([&(0, 400)]) {
+            map.cells[along(*cells)] = Cell { state: CellState::Obstacle, pixels: *pixels, ..Cell::default() };
+        }
+        smear::take_out(&mut map, &Place::ORIGIN, settings);
+        let state = |cells: i16| map.cells[along(cells)].state;
+        assert_eq!(state(0), CellState::Obstacle, "the thing itself stays");
+        behind.iter().map(|(cells, _)| state(*cells) == CellState::Obstacle).collect::<Vec<_>>()
+    };
+    for j in [-8, -1, 0, 5] {
+        assert_eq!(left_over(j, &[(1, 99)], &settings), [false], "{j}");
+        assert_eq!(left_over(j, &[(2, 99)], &settings), [false], "{j}");
+        assert_eq!(left_over(j, &[(3, 99)], &settings), [true], "{j}: too far behind");
+        assert_eq!(left_over(j, &[(1, 101)], &settings), [true], "{j}: enough of its own");
+        // What was taken out still stands for nothing itself.
+        assert_eq!(left_over(j, &[(2, 90), (3, 20)], &settings), [false, false], "{j}");
+        let never = MapSettings { smear_share: 0.0, ..settings };
+        assert_eq!(left_over(j, &[(1, 1)], &never), [true], "{j}");
+    }
+}
+
+#[test]
 fn sectors_are_those_of_a_plain_search() {
     let mut random = Random::seeded("sectors", 0x5eed_0152);
     for (round, width_deg) in (0..300).zip([5.0, 18.0, 0.5, 7.0].into_iter().cycle()) {
@@ -558,6 +595,9 @@ fn settings_that_cannot_be_are_named() {
     assert_eq!(field(MapSettings { free_min_pixels: 0, ..good }), "map.free_min_pixels");
     assert_eq!(field(MapSettings { free_max_height_m: 0.0, ..good }), "map.free_max_height_m");
     assert_eq!(field(MapSettings { height_noise_px: -0.1, ..good }), "map.height_noise_px");
+    assert_eq!(field(MapSettings { unclear_share: 1.1, ..good }), "map.unclear_share");
+    assert_eq!(field(MapSettings { smear_share: -0.1, ..good }), "map.smear_share");
+    assert_eq!(field(MapSettings { smear_cells: 9, ..good }), "map.smear_cells");
     assert_eq!(field(MapSettings { max_range_m: f32::INFINITY, ..good }), "map.max_range_m");
     assert_eq!(field(MapSettings { sector_width_deg: 18.5, ..good }), "map.sector_width_deg");
 }

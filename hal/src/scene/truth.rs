@@ -62,6 +62,8 @@ const HIGH_M: core::ops::RangeInclusive<f32> = 0.2..=2.2;
 /// Pixels that both cameras see. What covers fewer than this is smaller than a quarter of a 7 x 7 matching window.
 const OBSTACLE_PIXELS: u32 = 12;
 const FREE_PIXELS: u32 = 2;
+/// Ground so near before the foot of a thing does not hide it, metres: it is rough, and the line of sight grazes it.
+const FOOT_SLACK_M: f32 = 0.3;
 /// Spacing of the places in [`high_places`], metres.
 pub(crate) const MARK_M: f32 = 0.05;
 
@@ -109,6 +111,20 @@ impl Scene {
         let (_, x, aside_m) = *COURSE.get(thing)?;
         let v = self.pose(frame).to_vehicle(spot(&self.ground, side(self.options.seed), x, aside_m));
         self.cell(v.x, v.y).map(|index| self.options.map.cell_at(index))
+    }
+
+    /// Whether a crest hides the foot of a thing of [`COURSE`] from the left camera in a frame: of what stands behind it only the top
+    /// shows, if anything.
+    ///
+    /// The scene must be one with [`Content::Course`](super::Content::Course): others have nothing there.
+    pub fn course_foot_is_hidden(&self, thing: usize, frame: u32) -> bool {
+        let Some((_, x, aside_m)) = COURSE.get(thing) else { return true };
+        let (left, _) = Eye::ideal_pair(&self.options, &self.frame, self.pose(frame));
+        let foot = spot(&self.ground, side(self.options.seed), *x, *aside_m);
+        let (column, row, depth_m) = left.project(foot);
+        let met_m = self.ground.meet(left.origin, left.look(column, row));
+        // The foot itself is ground: what is met well before it lies in the way.
+        met_m.is_some_and(|met_m| met_m < depth_m - FOOT_SLACK_M)
     }
 
     fn see(&self, left: &Eye, right: &Eye, pose: Pose, x: f32, y: f32) -> Seen {
