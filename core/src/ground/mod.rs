@@ -39,6 +39,9 @@ pub struct GroundFinder {
     height_known: bool,
     min_support: f32,
     min_support_elsewhere: f32,
+    /// Largest error of a disparity that is believed, as a shift of the point along its ray, in parts of its distance and for each
+    /// metre of it.
+    most_noise_per_m: f32,
     /// Tangents of the largest tilt and of the steepest ground, cosine of the largest tilt.
     max_slope: f32,
     terrain_slope: f32,
@@ -58,6 +61,7 @@ impl GroundFinder {
             min_support_elsewhere: 0.0,
             max_slope: 0.0,
             terrain_slope: 0.0,
+            most_noise_per_m: 0.0,
             least_upright: 0.0,
             last: None,
             terrain: Terrain::new(),
@@ -105,6 +109,7 @@ impl GroundFinder {
     ) -> Option<GroundPlane> {
         let frame = self.frame?;
         let focal_baseline_px_m = geometry.0.focal_baseline_px_m().max(f32::MIN_POSITIVE);
+        self.most_noise_per_m = self.settings.fit_noise_max_px / focal_baseline_px_m;
         let mut found = None;
         for height in self.heights() {
             regions.join(surfaces, picture, |surface| self.may_be_ground(surface, height));
@@ -257,6 +262,7 @@ impl GroundFinder {
             let near = |surface: &Surface| plane.height_m(surface.points.mean_m).abs() <= tolerance;
             let on_it = table.iter().filter(|surface| self.tells_plane(surface, height) && near(surface));
             let noise_per_m = self.noise_per_m(table.iter().filter(|surface| self.tells_plane(surface, height)));
+            let noise_per_m = noise_per_m.min(self.most_noise_per_m);
             let mut support = 0;
             let mut points = Scatter::default();
             for surface in on_it {

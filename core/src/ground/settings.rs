@@ -14,6 +14,10 @@ pub struct GroundSettings {
     /// Surfaces whose middle lies within this distance of the plane are those that it is fitted to, metres. Not wider: kerbs
     /// and verges would tilt it.
     pub fit_tolerance_m: f32,
+    /// The error of a disparity moves a point along its ray, down when it moves away, and would tilt the plane away from the camera:
+    /// as much of it as the surfaces' points lie off their planes is taken out of their spread, and never more than this, px: points
+    /// lie off their planes for other reasons, too.
+    pub fit_noise_max_px: f32,
     /// A surface belongs to the ground if its middle lies within this distance of the plane, metres.
     pub surface_tolerance_m: f32,
     /// Allowance on top of it for each metre of range, metres: distances are less certain there, and the ground bends.
@@ -45,6 +49,7 @@ impl GroundSettings {
         max_tilt_deg: 0.0,
         height_tolerance_m: 0.0,
         fit_tolerance_m: 0.0,
+        fit_noise_max_px: 0.0,
         surface_tolerance_m: 0.0,
         surface_tolerance_per_m: 0.0,
         max_range_m: 0.0,
@@ -66,6 +71,7 @@ impl GroundSettings {
         ConfigError::check("ground.max_tilt_deg", self.max_tilt_deg, 0.0, 45.0)?;
         ConfigError::check("ground.height_tolerance_m", self.height_tolerance_m, 0.0, 20.0)?;
         ConfigError::check("ground.fit_tolerance_m", self.fit_tolerance_m, 0.001, 2.0)?;
+        ConfigError::check("ground.fit_noise_max_px", self.fit_noise_max_px, 0.0, 4.0)?;
         ConfigError::check("ground.surface_tolerance_m", self.surface_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.surface_tolerance_per_m", self.surface_tolerance_per_m, 0.0, 0.5)?;
         ConfigError::check("ground.max_range_m", self.max_range_m, 1.0, 1000.0)?;
@@ -86,6 +92,7 @@ impl Default for GroundSettings {
             max_tilt_deg: 20.0,
             height_tolerance_m: 0.5,
             fit_tolerance_m: 0.05,
+            fit_noise_max_px: 0.7,
             surface_tolerance_m: 0.06,
             surface_tolerance_per_m: 0.01,
             max_range_m: 25.0,

@@ -221,6 +221,7 @@ fn settings_that_cannot_be_are_named() {
     assert_eq!(field(GroundSettings { max_tilt_deg: 46.0, ..good }), "ground.max_tilt_deg");
     assert_eq!(field(GroundSettings { height_tolerance_m: -1.0, ..good }), "ground.height_tolerance_m");
     assert_eq!(field(GroundSettings { fit_tolerance_m: 0.0, ..good }), "ground.fit_tolerance_m");
+    assert_eq!(field(GroundSettings { fit_noise_max_px: 4.1, ..good }), "ground.fit_noise_max_px");
     assert_eq!(field(GroundSettings { surface_tolerance_m: f32::NAN, ..good }), "ground.surface_tolerance_m");
     assert_eq!(field(GroundSettings { surface_tolerance_per_m: 1.0, ..good }), "ground.surface_tolerance_per_m");
     assert_eq!(field(GroundSettings { max_range_m: f32::INFINITY, ..good }), "ground.max_range_m");

@@ -162,6 +162,10 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             Window::Narrow => settings.window_width,
             Window::Wide => settings.wide_window_width,
         };
+        let uniqueness_percent = match window {
+            Window::Narrow => settings.uniqueness_percent,
+            Window::Wide => settings.wide_uniqueness_percent,
+        };
         let radius = usize::from(width) / 2;
         let margin = radius + settings.reach();
         let disparities = usize::from(settings.disparities);
@@ -186,9 +190,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         }
         let area = u32::from(width) * u32::from(settings.window_height);
         let min_texture = (u32::from(settings.texture) * area) >> 4;
-        // Without a second window no texture is too weak for the first.
-        let weak_texture =
-            if settings.wide_window_width > 0 { (u32::from(settings.weak_texture) * area) >> 4 } else { 0 };
+        let weak_texture = (u32::from(settings.weak_texture) * area) >> 4;
         let max_saturated = area * u32::from(settings.saturated_percent) / 100;
         for x in first..end {
             let enter = x + radius;
@@ -223,11 +225,6 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             } else if texture < min_texture {
                 DisparityPixel::none(Reason::LowTexture)
             } else {
-                let uniqueness_percent = match window {
-                    Window::Narrow if texture < weak_texture => settings.weak_uniqueness_percent,
-                    Window::Narrow => settings.uniqueness_percent,
-                    Window::Wide => settings.wide_uniqueness_percent,
-                };
                 choose(costs, candidates, min_disparity + disparities - 1, uniqueness_percent)
             };
             let told_apart = !matches!(out.get(), Err(Reason::LowTexture | Reason::NotUnique));

@@ -47,9 +47,6 @@ pub struct MatchSettings {
     /// Below this mean absolute prefilter response under the first window the texture is weak, 1/16 grey values. Texture above it
     /// that is not unique is repetitive, and a wider window does not help.
     pub weak_texture: u16,
-    /// As `uniqueness_percent`, for the first window where the texture is weak and there is a second one to ask: what is not
-    /// clearly better is better asked of that.
-    pub weak_uniqueness_percent: u16,
     /// As `uniqueness_percent`, for the second window: its sums are larger and their noise relative to them smaller.
     pub wide_uniqueness_percent: u16,
     /// What the texture is measured on, and what absolute differences are taken of.
@@ -84,7 +81,6 @@ impl MatchSettings {
         window_height: 7,
         wide_window_width: 31,
         weak_texture: 224,
-        weak_uniqueness_percent: 12,
         wide_uniqueness_percent: 6,
         prefilter: Prefilter::HorizontalSobel,
         texture: 32,
@@ -102,7 +98,6 @@ impl MatchSettings {
         window_height: 0,
         wide_window_width: 0,
         weak_texture: 0,
-        weak_uniqueness_percent: 0,
         wide_uniqueness_percent: 0,
         prefilter: Prefilter::HorizontalSobel,
         texture: 0,
@@ -170,7 +165,6 @@ impl MatchSettings {
             return Err(ConfigError::new("matching.wide_window_width x matching.window_height", problem));
         }
         range("matching.weak_texture", self.weak_texture, 0, 1000)?;
-        range("matching.weak_uniqueness_percent", self.weak_uniqueness_percent, 0, 100)?;
         range("matching.wide_uniqueness_percent", self.wide_uniqueness_percent, 0, 100)?;
         range("matching.texture", self.texture, 0, 1000)?;
         range("matching.uniqueness_percent", self.uniqueness_percent, 0, 100)?;

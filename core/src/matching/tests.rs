@@ -172,8 +172,7 @@ impl<'a> Plain<'a> {
             return Some(DisparityPixel::none(Reason::OutOfRange));
         }
         let second = candidates.iter().filter(|&&(other, _)| (other - d).abs() > 1).map(|&(_, cost)| cost).min();
-        let weak = self.is_weak(window, (x, y)) && window.checks_back;
-        let percent = if weak { i32::from(self.settings.weak_uniqueness_percent) } else { window.uniqueness_percent };
+        let percent = window.uniqueness_percent;
         if percent > 0 && second.is_some_and(|second| second * 100 <= best * (100 + percent)) {
             return Some(DisparityPixel::none(Reason::NotUnique));
         }
@@ -186,12 +185,6 @@ impl<'a> Plain<'a> {
             return Some(DisparityPixel::none(Reason::LeftRightMismatch));
         }
         Some(pixel)
-    }
-
-    /// Whether there is too little texture for the narrow window alone.
-    fn is_weak(&self, narrow: &PlainWindow, at: (i32, i32)) -> bool {
-        let limit = i32::from(self.settings.weak_texture) * narrow.area() / 16;
-        self.settings.wide_window_width > 0 && self.texture(narrow, at) < limit
     }
 
     /// Whether the right partner of a pixel matches this pixel, with the same window.
@@ -219,9 +212,9 @@ impl<'a> Plain<'a> {
                 continue;
             };
             *seen.entry((s.cost.is_census(), Asked::Narrow, first.get().err())).or_default() += 1;
+            let weak = || self.texture(&narrow, at) < i32::from(s.weak_texture) * narrow.area() / 16;
             let undecided = matches!(first.get(), Err(Reason::LowTexture | Reason::NotUnique));
-            let second =
-                wide.as_ref().filter(|_| undecided && self.is_weak(&narrow, at)).and_then(|wide| self.ask(wide, at));
+            let second = wide.as_ref().filter(|_| undecided && weak()).and_then(|wide| self.ask(wide, at));
             if let Some(second) = second {
                 *seen.entry((s.cost.is_census(), Asked::Wide, second.get().err())).or_default() += 1;
             }
@@ -300,7 +293,6 @@ fn settings(random: &mut Random, round: u32) -> MatchSettings {
         window_height: edge(random),
         wide_window_width: if random.below(5) == 0 { 0 } else { window_width + 2 * wider },
         weak_texture: random.below(300) as u16,
-        weak_uniqueness_percent: random.below(20) as u16,
         wide_uniqueness_percent: random.below(12) as u16,
         prefilter,
         texture: random.below(60) as u16,

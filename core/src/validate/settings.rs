@@ -15,7 +15,7 @@ pub struct ValidateSettings {
 
 impl Default for ValidateSettings {
     fn default() -> Self {
-        Self { min_surface_px: 140, step_sixteenths: 8 }
+        Self { min_surface_px: 120, step_sixteenths: 8 }
     }
 }
 
