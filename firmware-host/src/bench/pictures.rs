@@ -92,7 +92,7 @@ impl BenchPictures {
         let mut pairs = Vec::new();
         let mut failure = None;
         while pairs.len() < MOST_PAIRS {
-            match input.source.next_pair(&make) {
+            match input.source.next_pair(make) {
                 Ok(Some(pair)) => pairs.push(pair),
                 Ok(None) => break,
                 Err(error) => failure = failure.or(Some(Failure::from(error))),
