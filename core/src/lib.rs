@@ -23,6 +23,7 @@ pub mod error;
 pub mod geometry;
 pub mod ground;
 pub mod health;
+mod links;
 pub mod map;
 pub mod matching;
 pub mod methods;

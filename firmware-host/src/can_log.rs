@@ -34,8 +34,9 @@ const STALE_NS: u64 = 500_000_000;
 /// Longest gap between pictures that is filled with heartbeats; what is longer is a mistake in the times.
 const LONGEST_GAP_NS: u64 = 600_000_000_000;
 /// Most runs of cells in a scan: 255 frames of 8.
-const RUNS: usize = 255 * CellsRepr::FD_RUNS;
-const FRAMES: usize = 255 + FIXED_FRAMES_PER_SCAN;
+pub(crate) const RUNS: usize = 255 * CellsRepr::FD_RUNS;
+/// ... and most frames.
+pub(crate) const FRAMES: usize = 255 + FIXED_FRAMES_PER_SCAN;
 
 /// One node on the bus: scans as they come, heartbeats at 10 Hz between them.
 #[derive(Debug)]

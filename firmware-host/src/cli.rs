@@ -8,7 +8,7 @@ use clap::{
 };
 use fencepost_core::methods::DetectorKind;
 
-use crate::{compare::Method, words};
+use crate::{compare::Method, live::MAX_PAIRS, words};
 
 /// Stereo obstacle detection: pictures from two cameras in, obstacle cells on a CAN bus out.
 #[derive(Debug, Parser)]
@@ -43,6 +43,8 @@ Examples:
   fencepost compare ~/recordings/garden --out out/compare
       Every detector on the same pairs, side by side; scores where there is
       truth
+  fencepost bench --recording ~/recordings/garden
+      How long a frame takes on this computer, stage by stage
   fencepost cameras
       The cameras that are plugged in, and the lines of a rig's file for them
   fencepost record --config rig.toml --out ~/recordings/yard --seconds 60
@@ -73,6 +75,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Run detectors over a recording side by side: pictures, scores, times and memory in one report.
     Compare(CompareArgs),
+    /// Measure how long the detector takes for a frame, from a raw pair to CAN payloads.
+    Bench(BenchArgs),
     /// Run a rig: from its cameras to the CAN bus, until SIGTERM or SIGINT.
     Run(RunArgs),
     /// Say what a recording, a calibration or a configuration holds, and what the detector can see with it.
@@ -151,6 +155,52 @@ pub struct CompareArgs {
     /// Settings of the detectors.
     #[command(flatten)]
     pub detector: DetectorArgs,
+}
+
+/// Arguments of `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Folder of a recording, of which the first 16 pairs are used; a rendered trail if left out.
+    #[arg(long, value_name = "DIR")]
+    pub recording: Option<PathBuf>,
+    /// Size of the pictures: cropped from the middle of the bottom edge, or repeated where they are too small; that of the
+    /// recording, or 512x384, if left out.
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<PictureSize>,
+    /// Frames that are measured, on each thread.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// Pairs that are worked on side by side, each by a thread with a detector of its own.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=MAX_PAIRS as i64))]
+    pub threads: u8,
+    /// The figures as JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Settings of the detector and of the bus.
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+/// Width and height of pictures, px.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PictureSize {
+    /// Width.
+    pub width: u32,
+    /// Height.
+    pub height: u32,
+}
+
+impl FromStr for PictureSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let side = |text: &str| text.parse().ok().filter(|side| (32..=4096).contains(side));
+        let (width, height) = text.split_once('x').unwrap_or((text, ""));
+        match (side(width), side(height)) {
+            (Some(width), Some(height)) => Ok(Self { width, height }),
+            _ => Err("give width and height, 32 to 4096 px, as in 640x480".to_string()),
+        }
+    }
 }
 
 /// Arguments of `run`.
@@ -440,6 +490,14 @@ mod tests {
         }
         for text in ["7..3", "3..3", "x", "1..y", "", "-1", "1...2"] {
             assert!(text.parse::<FrameRange>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn picture_sizes() {
+        assert_eq!("640x480".parse(), Ok(PictureSize { width: 640, height: 480 }));
+        for text in ["640", "640x", "x480", "640x480x3", "640X480", "31x480", "640x4097", "-640x480", "640 x 480", ""] {
+            assert!(text.parse::<PictureSize>().is_err(), "{text}");
         }
     }
 

@@ -12,13 +12,14 @@
 //! ```
 //!
 //! Live, `run` goes another way: [`live`] leads from cameras to a bus in threads of its own. [`record`] writes down what cameras
-//! see, and [`listen`] shows what is on a bus.
+//! see, and [`listen`] shows what is on a bus. [`bench`] measures how long a frame takes.
 //!
 //! Everything that can go wrong is a [`error::Failure`]: what is wrong, where, and the mend. The exit status is 0 if
 //! everything worked, 1 if the work failed or the input is bad, 2 if the program was called wrongly or its configuration
 //! cannot be used.
 #![deny(unsafe_code)]
 
+pub mod bench;
 pub mod can_log;
 pub mod cli;
 pub mod commands;
@@ -69,6 +70,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Replay(args) => commands::replay(&args, &mut console),
         Command::Compare(args) => commands::compare(&args, &mut console),
         Command::Run(args) => commands::run(&args, &mut console),
+        Command::Bench(args) => commands::bench(&args, &mut console),
         Command::Check(args) => commands::check(&args, &mut console),
         Command::Record(args) => commands::record_rig(&args, &mut console),
         Command::Cameras(args) => commands::cameras(&args, &mut console),

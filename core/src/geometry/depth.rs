@@ -1,6 +1,9 @@
 //! From disparity to distance by table.
 
+use core::ops::Range;
+
 use super::RectifiedPair;
+use crate::links::VALUES;
 
 /// Distances of all disparities of the search range.
 ///
@@ -10,6 +13,8 @@ pub struct DepthTable<const DISPARITIES: usize> {
     inverse: [[u32; 16]; DISPARITIES],
     /// Disparity of the first entry, 1/16 px.
     base_steps: u16,
+    /// Disparities that have a distance, 1/16 px, without 0.
+    covered: Range<u16>,
     scale_m: f32,
 }
 
@@ -19,7 +24,7 @@ const INVERSE_ONE: f32 = (1 << 25) as f32;
 impl<const DISPARITIES: usize> DepthTable<DISPARITIES> {
     /// An empty table: no disparity has a distance.
     pub const fn new() -> Self {
-        Self { inverse: [[0; 16]; DISPARITIES], base_steps: 0, scale_m: 0.0 }
+        Self { inverse: [[0; 16]; DISPARITIES], base_steps: 0, covered: 0..0, scale_m: 0.0 }
     }
 
     /// Fills the table for `disparities` disparities from `min_disparity` on. Disparities whose rays do not meet in front of
@@ -36,6 +41,23 @@ impl<const DISPARITIES: usize> DepthTable<DISPARITIES> {
             let steps = f32::from(self.base_steps) + i as f32 + offset_steps;
             *entry = if i < used && steps >= 1.0 { libm::roundf(INVERSE_ONE / steps) as u32 } else { 0 };
         }
+        let place = |i: usize| self.base_steps.saturating_add(u16::try_from(i).unwrap_or(u16::MAX));
+        let entries = self.inverse.as_flattened();
+        let first = entries.iter().position(|&inverse| inverse != 0);
+        let last = entries.iter().rposition(|&inverse| inverse != 0);
+        self.covered = match first.zip(last) {
+            Some((first, last)) => {
+                let (values, end) = (VALUES, place(last + 1));
+                place(first).clamp(values.start, values.end)..end.clamp(values.start, values.end)
+            }
+            None => 0..0,
+        };
+    }
+
+    /// The disparities of pixels that have a distance, 1/16 px: they lie side by side, because the table ends in itself and rays that
+    /// do not meet belong to the smallest disparities.
+    pub const fn covered(&self) -> Range<u16> {
+        self.covered.start..self.covered.end
     }
 
     /// Distance along the optical axis at a disparity in 1/16 px, in units of [`Self::scale_m`]; 0 if it has none.

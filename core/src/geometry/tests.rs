@@ -229,3 +229,28 @@ fn frames_are_rotations() {
         assert!((rows.determinant() - 1.0).abs() < 1.0e-6, "a mirror image");
     }
 }
+
+#[test]
+fn disparities_with_a_distance_lie_side_by_side() {
+    for (offset_px, min, disparities) in
+        [(0.0, 0, 16), (0.0, 5, 9), (-3.3, 0, 16), (2.0, 0, 12), (-50.0, 0, 16), (0.0, 0, 0), (0.0, 2040, 16)]
+    {
+        let pair = RectifiedPair {
+            width: 64,
+            height: 48,
+            focal_px: 100.0,
+            cx: 0.0,
+            cy: 0.0,
+            baseline_m: 0.1,
+            disparity_offset_px: offset_px,
+        };
+        let mut depth = DepthTable::<16>::new();
+        depth.configure(&pair, min, disparities);
+        let covered = depth.covered();
+        for steps in 0..=u16::MAX {
+            let pixel = crate::disparity::DisparityPixel::from_bits(steps);
+            let has_distance = pixel.has_value() && depth.inverse(steps) != 0;
+            assert_eq!(covered.contains(&steps), has_distance, "{steps} of {min} + {disparities}, {offset_px} px");
+        }
+    }
+}

@@ -9,7 +9,7 @@ pub(super) const BANDS: usize = 256;
 const SURROUNDINGS: usize = 4;
 
 /// Differences of neighbouring pixels count up to this, so that a few strong edges do not speak for a whole row.
-const STRONGEST: i16 = 32;
+const STRONGEST: u8 = 32;
 
 /// Deviations from the surroundings count up to this many mean deviations.
 const OUTSTANDING: f32 = 2.0;
@@ -66,11 +66,8 @@ impl Profile {
         let (Some(grey), Some(contrast)) = (self.grey.get_mut(band), self.contrast.get_mut(band)) else { return };
         let Some(after) = valid.get(2..).filter(|after| !after.is_empty()) else { return };
         let sum: u32 = valid.iter().map(|&grey| u32::from(grey)).sum();
-        let steps: u32 = after
-            .iter()
-            .zip(valid)
-            .map(|(&after, &before)| (i16::from(after) - i16::from(before)).abs().min(STRONGEST) as u32)
-            .sum();
+        let steps: u32 =
+            after.iter().zip(valid).map(|(&after, &before)| u32::from(after.abs_diff(before).min(STRONGEST))).sum();
         *grey += sum as f32 / valid.len() as f32;
         *contrast += steps as f32 / after.len() as f32;
     }

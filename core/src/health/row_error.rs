@@ -1,5 +1,7 @@
 //! Sparse matches that look above and below the row, and nearer than the disparity range.
 
+use core::array::from_fn;
+
 use heapless::Vec;
 
 use crate::{
@@ -31,7 +33,10 @@ const PATCH: u32 = ((2 * RADIUS + 1) * (2 * RADIUS + 1)) as u32;
 const LEAST_RISE: u32 = 2 * PATCH;
 
 /// Least contrast around a place that is worth looking at, filtered grey values, summed over 3 x 3 pixels.
-const LEAST_CONTRAST: u32 = 40;
+const LEAST_CONTRAST: u16 = 40;
+
+/// Neighbouring places that are looked at together.
+const LANES: usize = 16;
 
 /// Places without a disparity that are looked for over the whole range, at most.
 const SEARCHES: usize = 64;
@@ -165,25 +170,39 @@ fn most_contrast(
     row: &[DisparityPixel],
     part: core::ops::Range<usize>,
 ) -> Option<usize> {
-    let [above, middle, below] =
-        [MARGIN - 1, MARGIN, MARGIN + 1].map(|y| strip.left.get(y).copied().unwrap_or_default());
+    let rows = [MARGIN - 1, MARGIN, MARGIN + 1].map(|y| strip.left.get(y).copied().unwrap_or_default());
     let mut best = (0, None);
-    for x in part.step_by(2) {
-        let around = |row: &[u8]| -> [u32; 3] {
-            let get = |x: usize| row.get(x).copied().map_or(0, u32::from);
-            [get(x.saturating_sub(1)), get(x), get(x + 1)]
-        };
-        let [a, m, b] = [around(above), around(middle), around(below)];
-        let across: u32 = (0..3).map(|i| a[i].abs_diff(m[i]) + m[i].abs_diff(b[i])).sum();
-        let along: u32 = [a, m, b].iter().map(|r| r[0].abs_diff(r[1]) + r[1].abs_diff(r[2])).sum();
-        let contrast = across.min(along);
-        let Some(pixel) = row.get(x) else { break };
-        let usable = !matches!(pixel.get(), Err(Reason::OutsideValidArea | Reason::Saturated));
-        if usable && contrast >= LEAST_CONTRAST && contrast > best.0 {
-            best = (contrast, Some(x));
+    for first in part.clone().step_by(LANES) {
+        // One more to either side of the lanes.
+        let [above, middle, below] = rows.map(|row| window::<{ LANES + 2 }>(row, first.saturating_sub(1)));
+        let steps = |a: u8, b: u8| u16::from(a.abs_diff(b));
+        let across: [u16; LANES + 2] = from_fn(|i| steps(above[i], middle[i]) + steps(middle[i], below[i]));
+        let along: [u16; LANES + 1] =
+            from_fn(|i| [above, middle, below].iter().map(|row| steps(row[i], row[i + 1])).sum());
+        let contrasts: [u16; LANES] =
+            from_fn(|i| (across[i] + across[i + 1] + across[i + 2]).min(along[i] + along[i + 1]));
+        for (x, &contrast) in (first..part.end).zip(&contrasts).step_by(2) {
+            if contrast < LEAST_CONTRAST || contrast <= best.0 {
+                continue;
+            }
+            let Some(pixel) = row.get(x) else { break };
+            if !matches!(pixel.get(), Err(Reason::OutsideValidArea | Reason::Saturated)) {
+                best = (contrast, Some(x));
+            }
         }
     }
     best.1
+}
+
+/// `N` bytes of `row` from `first` on; 0 beyond its end.
+fn window<const N: usize>(row: &[u8], first: usize) -> [u8; N] {
+    let bytes = row.get(first..).unwrap_or_default();
+    if let Some(whole) = bytes.first_chunk::<N>() {
+        return *whole;
+    }
+    let mut padded = [0; N];
+    padded.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+    padded
 }
 
 /// The row in which the right picture shows the patch at `x`, against that of the left, 1/16 px; `None` if that cannot be told.
@@ -218,30 +237,40 @@ fn best_at(
     disparities: core::ops::RangeInclusive<usize>,
     down: usize,
 ) -> Option<(u32, usize)> {
+    // Places in the right picture whose patch is valid and whose disparity is asked for.
     let (first, end) = (usize::from(strip.right_span.start) + RADIUS, usize::from(strip.right_span.end));
+    let nearest = x.checked_sub(*disparities.start())?.saturating_add(1).min(end.saturating_sub(RADIUS));
+    let first = x.saturating_sub(*disparities.end()).max(first);
     let mut best: Option<(u32, usize)> = None;
-    for disparity in disparities {
-        let Some(there) = x.checked_sub(disparity).filter(|there| *there >= first) else { break };
-        if there + RADIUS >= end {
-            continue;
+    let mut upto = nearest;
+    // From the smallest disparity on, which wins where several fit alike.
+    while upto > first {
+        let from = upto.saturating_sub(LANES).max(first);
+        let costs = costs(strip, x, from, down);
+        let least = costs.iter().take(upto - from).copied().min().unwrap_or(u16::MAX);
+        if best.is_none_or(|(cost, _)| u32::from(least) < cost) {
+            let lane = costs.iter().take(upto - from).rposition(|&cost| cost == least);
+            best = lane.map(|lane| (u32::from(least), x - (from + lane))).or(best);
         }
-        let cost = cost(strip, x, there, down);
-        if best.is_none_or(|(least, _)| cost < least) {
-            best = Some((cost, disparity));
-        }
+        upto = from;
     }
     best
 }
 
-/// Sum of the absolute differences of two patches.
-fn cost(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, there: usize, down: usize) -> u32 {
-    let left = strip.left.iter().skip(REACH);
-    let right = strip.right.iter().skip(down);
-    let rows = left.zip(right).take(2 * RADIUS + 1);
-    rows.map(|(left, right)| {
-        let left = left.get(x.saturating_sub(RADIUS)..x + RADIUS + 1).unwrap_or_default();
-        let right = right.get(there.saturating_sub(RADIUS)..there + RADIUS + 1).unwrap_or_default();
-        left.iter().zip(right).map(|(&a, &b)| u32::from(a.abs_diff(b))).sum::<u32>()
-    })
-    .sum()
+/// Sums of the absolute differences of the patch at `x` of the left picture and each of [`LANES`] patches of the right one, from
+/// that at `there` on.
+fn costs(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, there: usize, down: usize) -> [u16; LANES] {
+    let mut costs = [0u16; LANES];
+    let rows = strip.left.iter().skip(REACH).zip(strip.right.iter().skip(down)).take(2 * RADIUS + 1);
+    for (left, right) in rows {
+        let left: [u8; 2 * RADIUS + 1] = window(left, x.saturating_sub(RADIUS));
+        let right: [u8; LANES + 2 * RADIUS] = window(right, there.saturating_sub(RADIUS));
+        for (column, &grey) in left.iter().enumerate() {
+            let places = right.iter().skip(column);
+            for (cost, &other) in costs.iter_mut().zip(places) {
+                *cost += u16::from(grey.abs_diff(other));
+            }
+        }
+    }
+    costs
 }

@@ -73,10 +73,20 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
     /// # Bound
     /// One pass over the row.
     pub(super) fn push(&mut self, y: usize, row: &[u8], span: ValidSpan) {
-        let valid = usize::from(span.start)..usize::from(span.end);
-        for (number, (block, pixels)) in self.blocks.iter_mut().zip(row.chunks_exact(BLOCK)).enumerate() {
-            let seen = number * BLOCK >= valid.start && (number + 1) * BLOCK <= valid.end && *block != UNSEEN;
-            *block = if seen { *block + pixels.iter().map(|&grey| u16::from(grey)).sum::<u16>() } else { UNSEEN };
+        // Blocks that are valid as a whole.
+        let (first, end) = (usize::from(span.start).div_ceil(BLOCK), usize::from(span.end) / BLOCK);
+        let (quads, _) = row.as_chunks::<BLOCK>();
+        let end = end.min(quads.len()).min(self.blocks.len());
+        let first = first.min(end);
+        self.blocks.iter_mut().take(first).for_each(|block| *block = UNSEEN);
+        self.blocks.iter_mut().take(quads.len()).skip(end).for_each(|block| *block = UNSEEN);
+        let seen = self.blocks.get_mut(first..end).unwrap_or_default();
+        for (block, quad) in seen.iter_mut().zip(quads.get(first..end).unwrap_or_default()) {
+            // Four bytes added up in one word: all blocks of a row can go through this side by side.
+            let word = u32::from_le_bytes(*quad);
+            let pairs = (word & 0x00ff_00ff) + (word >> 8 & 0x00ff_00ff);
+            // A block that was not seen stays so: its mark is the largest value.
+            *block = block.saturating_add((pairs + (pairs >> 16)) as u16);
         }
         if y % BLOCK == BLOCK - 1 {
             self.end_blocks(y / BLOCK, row.len() / BLOCK);
@@ -88,15 +98,15 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
         let Layout { across, down, columns, .. } = self.layout;
         let blocks = self.blocks.get_mut(..count).unwrap_or_default();
         if let (Some(steps), Some(counts)) = (self.steps.get_mut(row / down), self.counts.get_mut(row / down)) {
-            for (number, pair) in blocks.windows(2).enumerate() {
-                let &[a, b] = pair else { continue };
-                let column = number / across;
-                if a == UNSEEN || b == UNSEEN || column >= columns {
-                    continue;
-                }
-                if let (Some(steps), Some(count)) = (steps.get_mut(column), counts.get_mut(column)) {
-                    *steps += u32::from(a.abs_diff(b));
-                    *count = count.saturating_add(1);
+            for (column, (steps, count)) in steps.iter_mut().zip(counts).enumerate().take(columns) {
+                let first = column * across;
+                // The last of a column is compared with the first of the next.
+                let blocks = blocks.get(first..(first + across + 1).min(blocks.len())).unwrap_or_default();
+                let pairs = blocks.iter().zip(blocks.iter().skip(1));
+                for (&a, &b) in pairs {
+                    let known = a != UNSEEN && b != UNSEEN;
+                    *steps += if known { u32::from(a.abs_diff(b)) } else { 0 };
+                    *count = count.saturating_add(u16::from(known));
                 }
             }
         }

@@ -8,12 +8,15 @@ mod tile;
 pub use join::Regions;
 pub use settings::SurfaceSettings;
 
+use core::ops::Range;
+
 use heapless::Vec;
 
 use crate::{
     disparity::{DisparityPicture, DisparityPixel},
     error::{ConfigError, ConfigProblem},
     geometry::{DepthTable, Rays},
+    links::same,
     planes::Scatter,
 };
 use moments::{Moments, RowMoments};
@@ -189,11 +192,10 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             return SurfaceReport::default();
         }
         let pixels = picture.pixels();
-        let mut found = 0;
+        let (covered, mut found) = (depth.covered(), 0);
         for tile in Tile::all(self.width, self.height) {
-            let covers = |steps| depth.inverse(steps) != 0;
             let Self { union, settings, labels, width, .. } = self;
-            found += u32::from(union.label::<CODED>(pixels, *width, tile, settings, covers, labels));
+            found += u32::from(union.label::<CODED>(pixels, *width, tile, settings, &covered, labels));
         }
         let mut keep = KeepRule::everything();
         if found as usize > SURFACES {
@@ -313,38 +315,35 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
     ) {
         let stride = self.width;
         let row = |y: usize| (tile.y + y) * stride + tile.x..(tile.y + y) * stride + tile.x + tile.width;
-        // The farthest point of a surface decides how many bits its distances can keep.
-        let mut farthest = [0u32; MAX_SURFACES];
+        // The farthest point of a surface decides how many bits its distances can keep; it has the smallest disparity.
+        let mut farthest = [u16::MAX; MAX_SURFACES];
         let mut count = 0;
         for y in 0..tile.height {
-            for (pixel, &label) in pixels[row(y)].iter().zip(&self.labels[row(y)]) {
+            let pixels = pixels.get(row(y)).unwrap_or_default();
+            for (label, run) in segments(self.labels.get(row(y)).unwrap_or_default()) {
                 if let Some(farthest) = usize::from(label).checked_sub(1).and_then(|i| farthest.get_mut(i)) {
-                    *farthest = (*farthest).max(depth.inverse(pixel.steps()));
+                    let run = pixels.get(run).unwrap_or_default();
+                    *farthest = run.iter().fold(*farthest, |least, pixel| least.min(pixel.bits()));
                     count = count.max(usize::from(label));
                 }
             }
         }
         for ((farthest, shift), moments) in farthest.iter().zip(&mut self.shifts).zip(&mut self.moments).take(count) {
-            *shift = (u32::BITS - farthest.leading_zeros()).saturating_sub(16) as u8;
+            *shift = (u32::BITS - depth.inverse(*farthest).leading_zeros()).saturating_sub(16) as u8;
             *moments = Moments::ZERO;
         }
         let middle = (TILE / 2) as i32;
         for y in 0..tile.height {
             let v = y as i32 - middle;
-            let (mut current, mut sums) = (0u8, RowMoments::default());
-            for ((x, pixel), &label) in pixels[row(y)].iter().enumerate().zip(&self.labels[row(y)]) {
-                if label != current {
-                    if let Some(i) = usize::from(current).checked_sub(1) {
-                        self.moments[i].add(&sums, v);
-                    }
-                    (current, sums) = (label, RowMoments::default());
+            let pixels = pixels.get(row(y)).unwrap_or_default();
+            for (label, run) in segments(self.labels.get(row(y)).unwrap_or_default()) {
+                let Some(i) = usize::from(label).checked_sub(1) else { continue };
+                if let (Some(moments), Some(&shift)) = (self.moments.get_mut(i), self.shifts.get(i)) {
+                    let end = run.end as i32 - middle;
+                    let distances = pixels.get(run).unwrap_or_default().iter();
+                    let distances = distances.map(|pixel| depth.inverse(pixel.bits()) >> (shift & 31));
+                    moments.add(&RowMoments::of(distances, end), v);
                 }
-                if let Some(i) = usize::from(label).checked_sub(1) {
-                    sums.add(depth.inverse(pixel.steps()) >> self.shifts[i], x as i32 - middle);
-                }
-            }
-            if let Some(i) = usize::from(current).checked_sub(1) {
-                self.moments[i].add(&sums, v);
             }
         }
         let mut renumbered = [0u8; MAX_SURFACES];
@@ -393,6 +392,25 @@ impl<const PIXELS: usize, const SURFACES: usize> Default for Surfaces<PIXELS, SU
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// The pieces of a row of a tile that have one label each: label and columns.
+fn segments(labels: &[u8]) -> impl Iterator<Item = (u8, Range<usize>)> {
+    // Beyond the end everything is without a label, and so is what lies before.
+    let mut here = [0u8; TILE];
+    for (to, from) in here.iter_mut().zip(labels) {
+        *to = *from;
+    }
+    let mut before = [0u8; TILE];
+    before[1..].copy_from_slice(&here[..TILE - 1]);
+    let mut changes = !same(&here, &before);
+    let length = labels.len().min(TILE);
+    core::iter::from_fn(move || {
+        let first = changes.trailing_zeros() as usize;
+        changes &= changes.wrapping_sub(1);
+        let end = (changes.trailing_zeros() as usize).min(length);
+        here.get(first).map(|&label| (label, first..end))
+    })
 }
 
 /// Which surfaces are kept when there are too many: all that are larger than a size, and as many of that size as there is

@@ -36,15 +36,34 @@ pub(super) struct RowMoments {
 }
 
 impl RowMoments {
-    /// Adds a pixel.
-    pub(super) fn add(&mut self, z: u32, u: i32) {
-        let (z, u) = (i64::from(z), i64::from(u));
-        self.n += 1;
-        self.z += z;
-        self.zu += z * u;
-        self.zz += z * z;
-        self.zzu += z * z * u;
-        self.zzuu += z * z * u * u;
+    /// Sums over neighbouring pixels with the distances `z`, at most a tile's row of them, each of 16 bits; `end` is the column after
+    /// the last.
+    ///
+    /// Sums of sums need no product with the column: with `m` counted from the end, from 1, they are the sums of `z m` and of
+    /// `z m (m + 1) / 2`, and a column is `end - m`.
+    pub(super) fn of(z: impl Iterator<Item = u32>, end: i32) -> Self {
+        let (mut n, mut z0, mut z1) = (0u32, 0u32, 0u32);
+        let (mut q0, mut q1, mut q2) = (0u64, 0u64, 0u64);
+        for z in z {
+            let square = u64::from(z.wrapping_mul(z));
+            n += 1;
+            z0 = z0.wrapping_add(z);
+            z1 = z1.wrapping_add(z0);
+            q0 = q0.wrapping_add(square);
+            q1 = q1.wrapping_add(q0);
+            q2 = q2.wrapping_add(q1);
+        }
+        let end = i64::from(end);
+        let (z0, z1) = (i64::from(z0), i64::from(z1));
+        let [q0, q1, q2] = [q0, q1, q2].map(|sum| sum as i64);
+        Self {
+            n: i64::from(n),
+            z: z0,
+            zu: end * z0 - z1,
+            zz: q0,
+            zzu: end * q0 - q1,
+            zzuu: end * (end * q0 - 2 * q1) + (2 * q2 - q1),
+        }
     }
 }
 
@@ -108,6 +127,33 @@ impl Moments {
                 yz: entry(1, 2),
                 zz: entry(2, 2),
             },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::test_random::Random;
+
+    #[test]
+    fn sums_of_sums_are_the_sums_of_products() {
+        let mut random = Random::seeded("row moments", 0x5eed_0201);
+        for _ in 0..3000 {
+            let (first, length) = (random.below(32) as i32 - 16, random.below(33) as i32);
+            let end = (first + length).min(16);
+            let most = [1, 200, 65_536][random.below(3) as usize];
+            let row: Vec<u32> = (first..end).map(|_| random.below(most).max(most / 2 * random.below(2))).collect();
+            let found = RowMoments::of(row.iter().copied(), end);
+            let sum = |term: fn(i64, i64) -> i64| -> i64 {
+                row.iter().zip(first..end).map(|(&z, u)| term(i64::from(z), i64::from(u))).sum()
+            };
+            assert_eq!(found.n, row.len() as i64);
+            assert_eq!((found.z, found.zu), (sum(|z, _| z), sum(|z, u| z * u)));
+            let expected = (sum(|z, _| z * z), sum(|z, u| z * z * u), sum(|z, u| z * z * u * u));
+            assert_eq!((found.zz, found.zzu, found.zzuu), expected, "{first}..{end}: {row:?}");
         }
     }
 }

@@ -1,7 +1,14 @@
 //! Contiguous surfaces inside one tile.
 
+use core::ops::Range;
+
 use super::{SurfaceSettings, TILE};
-use crate::disparity::DisparityPixel;
+use crate::{
+    disparity::DisparityPixel,
+    links::{Links, PIECE, each_bit, near, piece, same},
+};
+
+const _: () = assert!(TILE == PIECE, "a row of a tile is one piece");
 
 /// Pixels of a tile.
 const AREA: usize = TILE * TILE;
@@ -42,9 +49,10 @@ impl Tile {
     }
 }
 
-/// Union-find over the pixels of one tile.
+/// Union-find over the runs of contiguous pixels of one tile, row by row; at worst each pixel is a run.
 pub(super) struct TileUnion {
     parent: [u16; AREA],
+    /// Pixels of the run; of the whole surface where the run stands for it.
     pixels: [u16; AREA],
 }
 
@@ -54,83 +62,119 @@ impl TileUnion {
     }
 
     /// Numbers the surfaces of a tile from 1 in the order of their first pixels and writes the numbers to `labels`, 0 where
-    /// there is none; returns how many there are. `covers` says which disparities are points. Of the settings the step and
-    /// the least number of pixels count here.
+    /// there is none; returns how many there are. `covered` are the disparities that are points, 1/16 px. Of the settings the
+    /// step and the least number of pixels count here.
     ///
     /// If `CODED`, `labels` holds a class below [`CODES`] for each pixel: only pixels of one class make a surface, and the class
     /// is left beside the number, [`CODE_SHIFT`] bits up.
     ///
     /// # Bound
-    /// Three passes over the tile.
+    /// Two passes over the tile, and three over its runs.
     pub(super) fn label<const CODED: bool>(
         &mut self,
         picture: &[DisparityPixel],
         stride: usize,
         tile: Tile,
         settings: &SurfaceSettings,
-        covers: impl Fn(u16) -> bool,
+        covered: &Range<u16>,
         labels: &mut [u8],
     ) -> u8 {
-        let SurfaceSettings { step_sixteenths: step, min_pixels, .. } = *settings;
-        let row = |y: usize| &picture[(tile.y + y) * stride + tile.x..][..tile.width];
-        let steps_of =
-            |pixel: &DisparityPixel| Some(pixel.steps()).filter(|&steps| steps != 0 && covers(steps)).unwrap_or(0);
-        for y in 0..tile.height {
-            let here = row(y);
-            let above = row(y.saturating_sub(1));
-            let codes = |y: usize| &labels[(tile.y + y) * stride + tile.x..][..tile.width];
-            let (codes_here, codes_above) = (codes(y), codes(y.saturating_sub(1)));
-            let mut left = 0u16;
-            for x in 0..tile.width {
-                let place = y * TILE + x;
-                let steps = steps_of(&here[x]);
-                self.pixels[place] = 0;
-                self.parent[place] = place as u16;
-                if steps != 0 {
-                    if left != 0 && left.abs_diff(steps) <= step && (!CODED || codes_here[x - 1] == codes_here[x]) {
-                        self.parent[place] = self.parent[place - 1];
-                    }
-                    let up = if y > 0 { steps_of(&above[x]) } else { 0 };
-                    if up != 0 && up.abs_diff(steps) <= step && (!CODED || codes_above[x] == codes_here[x]) {
-                        self.join(place, place - TILE);
-                    }
-                }
-                left = steps;
-            }
-        }
-        for y in 0..tile.height {
-            for (x, pixel) in row(y).iter().enumerate() {
-                if steps_of(pixel) != 0 {
-                    let root = self.root(y * TILE + x);
-                    self.pixels[root] += 1;
-                }
+        let (rows, runs) = self.join_runs::<CODED>(picture, stride, tile, settings, covered, labels);
+        // What stands for a surface comes first in it.
+        for run in 0..runs {
+            let root = self.parent[usize::from(self.parent[run])];
+            self.parent[run] = root;
+            if usize::from(root) != run {
+                self.pixels[usize::from(root)] += self.pixels[run];
             }
         }
         // The count of a surface makes room for its number as soon as the number is known.
         let most = if CODED { usize::from(NUMBER_MASK) } else { MAX_SURFACES };
         let mut found = 0u8;
-        for y in 0..tile.height {
-            let labels = &mut labels[(tile.y + y) * stride + tile.x..][..tile.width];
-            for ((x, pixel), label) in row(y).iter().enumerate().zip(labels) {
-                let code = *label;
-                *label = 0;
-                if steps_of(pixel) == 0 {
-                    continue;
-                }
-                let root = self.root(y * TILE + x);
+        let mut run = 0;
+        for (y, links) in rows.iter().enumerate().take(tile.height) {
+            let Some(labels) = labels.get_mut((tile.y + y) * stride + tile.x..).and_then(|l| l.get_mut(..tile.width))
+            else {
+                break;
+            };
+            let mut numbers = [0u8; TILE];
+            for bit in each_bit(links.starts()) {
+                let root = usize::from(self.parent[run % AREA]);
+                run += 1;
                 let pixels = &mut self.pixels[root];
                 if *pixels & NUMBERED == 0 {
-                    let enough = *pixels >= min_pixels && usize::from(found) < most;
+                    let enough = *pixels >= settings.min_pixels && usize::from(found) < most;
                     found += u8::from(enough);
                     *pixels = NUMBERED | if enough { u16::from(found) } else { 0 };
                 }
-                *label = (*pixels & !NUMBERED) as u8;
-                if CODED && *label != 0 {
-                    *label |= code << CODE_SHIFT;
+                let mut number = (*pixels & !NUMBERED) as u8;
+                if number == 0 {
+                    continue;
                 }
+                let first = bit.trailing_zeros() as usize;
+                if CODED {
+                    number |= labels.get(first).map_or(0, |code| code << CODE_SHIFT);
+                }
+                numbers.iter_mut().skip(first).take(length(links.left, first)).for_each(|to| *to = number);
+            }
+            for (label, number) in labels.iter_mut().zip(numbers) {
+                *label = number;
             }
         }
         found
+    }
+
+    /// Finds the runs of the tile, counts their pixels and joins those that touch; returns how the pixels of each row hang together,
+    /// and how many runs there are.
+    fn join_runs<const CODED: bool>(
+        &mut self,
+        picture: &[DisparityPixel],
+        stride: usize,
+        tile: Tile,
+        settings: &SurfaceSettings,
+        covered: &Range<u16>,
+        labels: &[u8],
+    ) -> ([Links; TILE], usize) {
+        let step = settings.step_sixteenths;
+        let mut rows = [Links::default(); TILE];
+        let (mut above, mut codes_above, mut links_above) = ([0; TILE], [0; TILE], Links::default());
+        // The first run of the row above, and the number of runs so far.
+        let (mut first_above, mut runs) = (0usize, 0usize);
+        for (y, row) in rows.iter_mut().enumerate().take(tile.height) {
+            let from = (tile.y + y) * stride + tile.x;
+            let here = piece(picture.get(from..from + tile.width).unwrap_or_default(), 0);
+            let mut links = Links::of(&here, 0, covered, step);
+            let mut up = links.value & links_above.value & near(&here, &above, step);
+            if CODED {
+                let mut codes = [0; TILE];
+                codes
+                    .iter_mut()
+                    .zip(labels.get(from..from + tile.width).unwrap_or_default())
+                    .for_each(|(to, from)| *to = *from);
+                let mut codes_before = [0; TILE];
+                codes_before[1..].copy_from_slice(&codes[..TILE - 1]);
+                links.left &= same(&codes, &codes_before);
+                up &= same(&codes, &codes_above);
+                codes_above = codes;
+            }
+            let starts = links.starts();
+            for (run, bit) in (runs..AREA).zip(each_bit(starts)) {
+                self.parent[run] = run as u16;
+                self.pixels[run] = length(links.left, bit.trailing_zeros() as usize) as u16;
+            }
+            // Where both runs go on, so does what is known of them.
+            for bit in each_bit(up & !(up << 1 & links.left & links_above.left)) {
+                let upto = bit | (bit - 1);
+                let run = runs + (starts & upto).count_ones() as usize;
+                let run_above = first_above + (links_above.starts() & upto).count_ones() as usize;
+                // Both began, as their pixels belong to them.
+                self.join(run - 1, run_above - 1);
+            }
+            first_above = runs;
+            runs += starts.count_ones() as usize;
+            (above, links_above, *row) = (here, links, links);
+        }
+        (rows, runs)
     }
 
     /// Room for a count by size, while no tile is being labelled.
@@ -153,6 +197,11 @@ impl TileUnion {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b)] = a.min(b) as u16;
     }
+}
+
+/// Pixels of the run that begins at pixel `first`: with it all that hang together with their left neighbour.
+const fn length(left: u32, first: usize) -> usize {
+    1 + (left >> first >> 1).trailing_ones() as usize
 }
 
 /// Marks the count of a surface that has become its number.

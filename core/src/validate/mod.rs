@@ -9,6 +9,7 @@ use heapless::Vec;
 use crate::{
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
+    links::{Links, PIECE, VALUES, each_bit, near, piece},
 };
 
 /// Largest value of [`ValidateSettings::min_surface_px`]: the room for walking over one small surface.
@@ -16,16 +17,17 @@ pub const MAX_SURFACE_PX: usize = 1024;
 
 /// Takes contiguous surfaces out of the disparity picture that are too small to be believed.
 ///
-/// Source: the paper, section 4.2. Union-find joins each row with the one above. Only the surfaces that reach the current
-/// row are kept in a table, so the memory grows with the width and not with the picture: when a surface ends and is too
-/// small, it is walked over once more and taken out.
+/// Source: the paper, section 4.2. Union-find joins the runs of contiguous pixels of each row with those of the row above. Only the
+/// surfaces that reach the current row are kept in a table, so the memory grows with the width and not with the picture: when a
+/// surface ends and is too small, it is walked over once more and taken out.
 ///
 /// # Bound
-/// Two passes of `width x height` steps (join, renumber), and at most one more over the pixels of small surfaces.
+/// One pass over `width x height` pixels, one over the runs, as many as pixels at most, and at most one more over the pixels of
+/// small surfaces.
 pub struct SurfaceSize<const WIDTH: usize> {
     settings: ValidateSettings,
     width: usize,
-    /// Surface of each pixel in the row above and in the current row; [`NONE`] where there is no disparity.
+    /// Surface of each run of contiguous pixels in the row above and in the current row, from the left.
     above: [u16; WIDTH],
     here: [u16; WIDTH],
     /// Surfaces that reach the row above, then those that begin in the current row.
@@ -94,11 +96,10 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         if self.settings.min_surface_px <= 1 || self.width == 0 {
             return;
         }
-        self.above[..self.width].fill(NONE);
         let mut open = 0;
         for y in 0..picture.len() / self.width {
-            let used = self.join_row(picture, y, open);
-            open = self.end_row(picture, used);
+            let (runs, used) = self.join_row(picture, y, open);
+            open = self.end_row(picture, runs, used);
         }
         for place in 0..open {
             self.take_out(picture, self.next[place]);
@@ -106,56 +107,62 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
     }
 
     /// Joins row `y` with itself and with the row above, whose surfaces are the first `open` of the table; returns how
-    /// many entries of the table are used.
-    fn join_row(&mut self, picture: &[DisparityPixel], y: usize, open: usize) -> usize {
+    /// many runs it has and how many entries of the table are used.
+    fn join_row(&mut self, picture: &[DisparityPixel], y: usize, open: usize) -> (usize, usize) {
         let Self { settings, width, above, here, table, .. } = self;
-        let (reach, limit) = (settings.step_sixteenths, settings.min_surface_px);
-        let row = &picture[y * *width..(y + 1) * *width];
-        let row_above = &picture[y.saturating_sub(1) * *width..][..*width];
-        let table = table.as_flattened_mut();
-        let mut used = open;
-        let (mut left_steps, mut left_label, mut left_up) = (0, NONE, NONE);
-        for (x, (pixel, pixel_above)) in row.iter().zip(row_above).enumerate() {
-            let steps = pixel.steps();
-            let (mut label, mut joined_up) = (NONE, NONE);
-            if steps != 0 {
-                if left_label != NONE && steps.abs_diff(left_steps) <= reach {
-                    label = left_label;
-                    joined_up = left_up;
+        let ValidateSettings { step_sixteenths: step, min_surface_px: limit } = *settings;
+        let row = picture.get(y * *width..(y + 1) * *width).unwrap_or_default();
+        let before = y.checked_sub(1).and_then(|y| picture.get(y * *width..(y + 1) * *width));
+        let row_above = before.unwrap_or_default();
+        let mut run = Run { table: table.as_flattened_mut(), used: open, limit, label: NONE, first: (0, 0), from: 0 };
+        // Runs that began, here and above, pixels with a value that went by, and whether the last pixel of the piece before hangs
+        // together with the one above it.
+        let (mut runs, mut runs_above, mut values, mut up_before) = (0usize, 0u32, 0u32, 0u32);
+        for x in (0..row.len()).step_by(PIECE) {
+            let last =
+                |row: &[DisparityPixel]| x.checked_sub(1).and_then(|x| row.get(x)).map_or(0, |pixel| pixel.bits());
+            let (pixels, pixels_above) = (piece(row, x), piece(row_above, x));
+            let links = Links::of(&pixels, last(row), &VALUES, step);
+            let links_above = Links::of(&pixels_above, last(row_above), &VALUES, step);
+            let (starts, starts_above) = (links.starts(), links_above.starts());
+            let up = links.value & links_above.value & near(&pixels, &pixels_above, step);
+            // Where both runs go on, so does what is known of them.
+            let joins = up & !((up << 1 | up_before) & links.left & links_above.left);
+            for bit in each_bit(starts | joins) {
+                if starts & bit != 0 {
+                    let went_by = values + (links.value & (bit - 1)).count_ones();
+                    if let Some(label) = runs.checked_sub(1).and_then(|before| here.get_mut(before)) {
+                        *label = run.end(went_by);
+                    }
+                    run.begin((x as u32 + bit.trailing_zeros(), y), went_by);
+                    runs += 1;
                 }
-                let up = above[x];
-                if up != NONE && up != joined_up && steps.abs_diff(pixel_above.steps()) <= reach {
-                    label = if label == NONE { root(table, up) } else { join(table, label, up, limit) };
-                    joined_up = up;
+                if joins & bit != 0 {
+                    let began_above = runs_above + (starts_above & (bit | (bit - 1))).count_ones();
+                    // It began, as the pixel above belongs to it.
+                    run.join(above.get(began_above as usize - 1).copied().unwrap_or(NONE));
                 }
-                if label == NONE {
-                    label = used as u16;
-                    table[used] = Open { parent: label, pixels: 0, seed: (x as u16, y as u16) };
-                    used += 1;
-                }
-                let pixels = &mut table[usize::from(label)].pixels;
-                *pixels = (*pixels + 1).min(limit);
             }
-            here[x] = label;
-            (left_steps, left_label, left_up) = (steps, label, joined_up);
+            runs_above += starts_above.count_ones();
+            values += links.value.count_ones();
+            up_before = up >> (PIECE - 1);
         }
-        used
+        if let Some(label) = runs.checked_sub(1).and_then(|before| here.get_mut(before)) {
+            *label = run.end(values);
+        }
+        (runs, run.used)
     }
 
-    /// Takes out the small surfaces that do not reach the current row and numbers the others anew; returns how many there
-    /// are.
-    fn end_row(&mut self, picture: &mut [DisparityPixel], used: usize) -> usize {
+    /// Takes out the small surfaces that do not reach the current row, which has `runs` runs, and numbers the others anew; returns
+    /// how many there are.
+    fn end_row(&mut self, picture: &mut [DisparityPixel], runs: usize, used: usize) -> usize {
         let mut open = 0;
         {
-            let Self { width, above, here, table, next, renumbered, .. } = self;
+            let Self { above, here, table, next, renumbered, .. } = self;
             let table = table.as_flattened_mut();
             let renumbered = renumbered.as_flattened_mut();
             renumbered[..used].fill(NONE);
-            for (&here, above) in here[..*width].iter().zip(above.iter_mut()) {
-                *above = NONE;
-                if here == NONE {
-                    continue;
-                }
+            for (&here, above) in here.iter().zip(above.iter_mut()).take(runs) {
                 let root = usize::from(root(table, here));
                 if renumbered[root] == NONE {
                     renumbered[root] = open as u16;
@@ -214,6 +221,46 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
 impl<const WIDTH: usize> Default for SurfaceSize<WIDTH> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// The run of contiguous pixels that is being gone through.
+struct Run<'a> {
+    table: &'a mut [Open],
+    /// Entries of the table that are used.
+    used: usize,
+    /// Pixels are counted up to here.
+    limit: u16,
+    /// Surface that it belongs to; [`NONE`] as long as it touches none.
+    label: u16,
+    /// Its first pixel, and how many pixels with a value lie before that in the row.
+    first: (u16, u16),
+    from: u32,
+}
+
+impl Run<'_> {
+    fn begin(&mut self, (x, y): (u32, usize), from: u32) {
+        (self.label, self.first, self.from) = (NONE, (x as u16, y as u16), from);
+    }
+
+    /// Joins the run with a surface that touches it.
+    fn join(&mut self, other: u16) {
+        self.label = match self.label {
+            NONE => root(self.table, other),
+            label => join(self.table, label, other, self.limit),
+        };
+    }
+
+    /// Counts its pixels, `to` pixels with a value into the row, and gives its surface.
+    fn end(&mut self, to: u32) -> u16 {
+        if self.label == NONE {
+            self.label = self.used as u16;
+            self.table[self.used] = Open { parent: self.label, pixels: 0, seed: self.first };
+            self.used += 1;
+        }
+        let pixels = &mut self.table[usize::from(self.label)].pixels;
+        *pixels = (u32::from(*pixels) + (to - self.from)).min(u32::from(self.limit)) as u16;
+        self.label
     }
 }
 

@@ -1,5 +1,6 @@
 //! What the program does, a module for each command.
 
+mod bench;
 mod cameras;
 mod can;
 mod check;
@@ -11,6 +12,7 @@ mod record;
 mod replay;
 mod run;
 
+pub use bench::bench;
 pub use cameras::cameras;
 pub use can::decode;
 pub use check::check;

@@ -92,11 +92,8 @@ fn extremes_do_not_overflow() {
     for near in [0, u32::from(u16::MAX)] {
         let mut moments = Moments::ZERO;
         for y in -16..16 {
-            let mut row = RowMoments::default();
-            for x in -16..16 {
-                row.add(if x < 0 { near } else { u32::from(u16::MAX) }, x);
-            }
-            moments.add(&row, y);
+            let row = (-16..16).map(|x| if x < 0 { near } else { u32::from(u16::MAX) });
+            moments.add(&RowMoments::of(row, 16), y);
         }
         assert_eq!(moments.pixels(), 1024);
         let scatter = moments.scatter(&rays, 8000.0, 8000.0, 1.0e3);
