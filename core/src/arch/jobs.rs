@@ -1,0 +1,121 @@
+//! What is handed to a backend.
+
+use core::ops::Range;
+
+/// Pixels that are searched for at a time.
+pub(crate) const CHUNK: usize = 64;
+
+/// Room in front of the sums of the pixel at hand, so that both neighbours of any place can be read; as much is needed behind.
+pub(crate) const PAD: usize = 16;
+
+/// A row of census codes of both pictures.
+#[derive(Clone, Copy)]
+pub(crate) struct CodeRow<'a> {
+    pub(crate) left: &'a [u8],
+    /// Right codes, or their lower four bits where the backend splits them; pixel `x` at `lead + x`.
+    pub(crate) low: &'a [u8],
+    /// Upper four bits, where the backend splits codes; pixel `x` at `lead + x`.
+    pub(crate) high: &'a [u8],
+    /// Bytes in front of the first pixel that may be read and mean nothing.
+    pub(crate) lead: usize,
+}
+
+/// Sums over the rows of a window: `stride` of them for each column, the largest disparity first.
+pub(crate) struct SlideCodes<'a> {
+    pub(crate) columns: &'a mut [u8],
+    pub(crate) stride: usize,
+    pub(crate) disparities: usize,
+    pub(crate) min_disparity: usize,
+    pub(crate) enter: CodeRow<'a>,
+    pub(crate) leave: Option<CodeRow<'a>>,
+}
+
+/// What is searched for: the pixels `range` of a row.
+///
+/// Place `e` of a column or of the sums under a window belongs to disparity `min_disparity + disparities - 1 - e`.
+#[derive(Clone, Debug)]
+pub(crate) struct Search {
+    pub(crate) range: Range<usize>,
+    /// Whether the sums under the window are those of the pixel before, or are to be made afresh.
+    pub(crate) follows: bool,
+    /// Half the width of the window.
+    pub(crate) radius: usize,
+    pub(crate) stride: usize,
+    pub(crate) disparities: usize,
+    pub(crate) min_disparity: usize,
+    /// Right pixels on which a window may stand.
+    pub(crate) right_first: usize,
+    pub(crate) right_end: usize,
+    pub(crate) uniqueness_percent: u16,
+}
+
+/// For each right pixel the best left partner: two tables, right pixel `x` at `lead + x`.
+///
+/// With keys both tables hold keys whose place is counted from the smallest disparity, made of every other left pixel each;
+/// without, costs less 32768 and disparities. `i16::MAX` is nothing.
+pub(crate) struct Right<'a> {
+    pub(crate) tables: [&'a mut [i16]; 2],
+    pub(crate) lead: usize,
+}
+
+/// The best place of each pixel that was searched for, and what is beside it. Nothing is said of pixels without candidates.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Found {
+    pub(crate) cost: [u16; CHUNK],
+    /// Place of the least cost, the first one of several; the highest bit says that another one not beside it is nearly as good.
+    pub(crate) place: [u16; CHUNK],
+    /// Cost one place farther on: at one disparity less.
+    pub(crate) farther: [u16; CHUNK],
+    pub(crate) nearer: [u16; CHUNK],
+}
+
+/// Bit of [`Found::place`].
+pub(crate) const AMBIGUOUS: u16 = 0x8000;
+
+impl Found {
+    pub(crate) const fn new() -> Self {
+        Self { cost: [0; CHUNK], place: [0; CHUNK], farther: [0; CHUNK], nearer: [0; CHUNK] }
+    }
+
+    /// Writes down the best place of pixel `i` of the chunk. `near` is the number of places whose cost is within what is
+    /// ambiguous, itself included.
+    #[inline(always)]
+    pub(crate) fn put(&mut self, i: usize, place: usize, [nearer, cost, farther]: [u16; 3], near: u32, limit: u32) {
+        let beside = 1 + u32::from(u32::from(nearer) <= limit) + u32::from(u32::from(farther) <= limit);
+        let i = i % CHUNK;
+        self.cost[i] = cost;
+        self.place[i] = place as u16 | if near > beside { AMBIGUOUS } else { 0 };
+        self.farther[i] = farther;
+        self.nearer[i] = nearer;
+    }
+}
+
+impl Search {
+    /// Places whose right window lies within the right picture, for left pixel `x`.
+    #[inline(always)]
+    pub(crate) fn candidates(&self, x: usize) -> Range<usize> {
+        let top = self.min_disparity + self.disparities - 1;
+        let Some(reach) = x.checked_sub(self.right_first) else { return 0..0 };
+        let largest = top.min(reach);
+        let smallest = self.min_disparity.max((x + 1).saturating_sub(self.right_end));
+        if largest < smallest || self.right_first >= self.right_end {
+            return 0..0;
+        }
+        top - largest..top - smallest + 1
+    }
+
+    /// Pixels that have all candidates, within `range`.
+    #[cfg(target_arch = "x86_64")]
+    pub(crate) fn inner(&self) -> Range<usize> {
+        let first = self.right_first + self.min_disparity + self.disparities - 1;
+        let end = if self.right_first < self.right_end { self.right_end + self.min_disparity } else { 0 };
+        let first = first.clamp(self.range.start, self.range.end);
+        first..end.clamp(first, self.range.end)
+    }
+
+    /// The largest cost that is nearly as good as `cost`. No sum under a window exceeds 16 bits.
+    #[inline(always)]
+    pub(crate) fn limit(&self, cost: u16) -> u32 {
+        u32::from(cost) * (100 + u32::from(self.uniqueness_percent)) / 100
+    }
+}
