@@ -1,36 +1,38 @@
 //! What becomes of the pixels that were searched for.
 
-use super::jobs::{AMBIGUOUS, CHUNK, Found, Search};
+use super::jobs::{CHUNK, Found, Search};
 use crate::disparity::{DisparityPixel, Reason};
 
-/// What is known of the windows around the pixels of a chunk beside their costs.
+/// What is known of the windows around the pixels of a chunk beside their costs: sums of [`evidence`].
 #[derive(Clone, Debug)]
-pub(crate) struct Sums {
-    /// Prefilter responses under the window.
-    pub(crate) texture: [u32; CHUNK],
-    /// Saturated pixels under the window.
-    pub(crate) saturated: [u32; CHUNK],
+pub(crate) struct Sums([u32; CHUNK]);
+
+/// Bits of the texture in a sum; the number of saturated pixels lies above them. 63 x 21 responses of at most 127 fit.
+const TEXTURE_BITS: u32 = 20;
+
+/// What a pixel adds to a sum: a response of at most 127, and whether it is saturated.
+#[inline(always)]
+pub(crate) const fn evidence(response: u8, saturated: bool) -> u32 {
+    response as u32 | (saturated as u32) << TEXTURE_BITS
 }
 
 impl Sums {
     pub(crate) const fn new() -> Self {
-        Self { texture: [0; CHUNK], saturated: [0; CHUNK] }
+        Self([0; CHUNK])
     }
 
     /// Sums the columns under the window around each pixel of the search.
     ///
     /// # Bound
     /// A step for each pixel, and for each column of the first window.
-    pub(crate) fn make(&mut self, search: &Search, texture: &[u16], saturated: &[u16]) {
-        for (columns, sums) in [(texture, &mut self.texture), (saturated, &mut self.saturated)] {
-            let before = search.range.start.saturating_sub(search.radius + 1);
-            let leaving = columns.get(before..).unwrap_or_default();
-            let entering = columns.get(search.range.start + search.radius..).unwrap_or_default();
-            let mut sum: u32 = leaving.iter().take(2 * search.radius + 1).map(|&sum| u32::from(sum)).sum();
-            for ((out, &enter), &leave) in sums.iter_mut().zip(entering).zip(leaving) {
-                sum = sum.wrapping_add(u32::from(enter)).wrapping_sub(u32::from(leave));
-                *out = sum;
-            }
+    pub(crate) fn make(&mut self, search: &Search, columns: &[u32]) {
+        let before = search.range.start.saturating_sub(search.radius + 1);
+        let leaving = columns.get(before..).unwrap_or_default();
+        let entering = columns.get(search.range.start + search.radius..).unwrap_or_default();
+        let mut sum = leaving.iter().take(2 * search.radius + 1).fold(0u32, |sum, &column| sum.wrapping_add(column));
+        for ((out, &enter), &leave) in self.0.iter_mut().zip(entering).zip(leaving) {
+            sum = sum.wrapping_add(enter).wrapping_sub(leave);
+            *out = sum;
         }
     }
 }
@@ -46,6 +48,8 @@ pub(crate) struct Decide {
     pub(crate) only_weak: bool,
     /// Whether ambiguous places are refused.
     pub(crate) unique: bool,
+    /// Whether keys were found, or costs.
+    pub(crate) keys: bool,
 }
 
 impl Decide {
@@ -67,55 +71,66 @@ impl Decide {
         weak: &mut [bool],
     ) {
         let top = (search.min_disparity + search.disparities - 1) as i32;
-        let (min_disparity, right_first, right_end) =
-            (search.min_disparity as i32, search.right_first as i32, search.right_end as i32);
-        let none = |reason: Reason| u32::from(DisparityPixel::none(reason).bits());
-        let limits = found.cost.iter().zip(&found.place).zip(found.farther.iter().zip(&found.nearer));
-        let sums = sums.texture.iter().zip(&sums.saturated);
-        let pixels = out.iter_mut().zip(weak);
+        let min_disparity = search.min_disparity as i32;
+        let (right_first, right_end) = (search.right_first as i32, search.right_end as i32);
         let start = search.range.start as i32;
-        for ((i, (out, weak)), (((&cost, &place), (&farther, &nearer)), (&texture, &saturated))) in
-            (0i32..).zip(pixels).zip(limits.zip(sums))
-        {
-            let x = start + i;
+        let shift = if self.keys { 7 } else { 0 };
+        let cost = |number: i16| i32::from(number.wrapping_sub(i16::MIN) as u16 >> shift);
+        let none = |reason: Reason| i32::from(DisparityPixel::none(reason).bits());
+        let (mut decided, mut untold) = ([0u16; CHUNK], [0u8; CHUNK]);
+        // Arrays of one length and one step for each pixel: this becomes vector instructions.
+        for i in 0..CHUNK {
+            let x = start + i as i32;
             let largest = top.min(x - right_first);
             let smallest = min_disparity.max(x + 1 - right_end);
-            let ambiguous = (place & AMBIGUOUS != 0) & self.unique;
-            let disparity = top - i32::from(place & !AMBIGUOUS);
-            let (cost, farther, nearer) = (i32::from(cost), i32::from(farther), i32::from(nearer));
-            let steps = (16 * disparity + refine(farther, cost, nearer)).max(0);
-            // As `DisparityPixel::from_steps`.
-            let valueless = (steps == 0) | (steps >= 0x8000);
-            let bits = if valueless { none(Reason::OutOfRange) } else { steps as u32 };
+            let above = found.above[i];
+            // The two places beside the best one do not count.
+            let beside = 1 + u16::from(found.nearer[i] < above) + u16::from(found.farther[i] < above);
+            let ambiguous = self.unique & (found.near[i] > beside);
+            let disparity = top - i32::from(found.place[i]);
+            let offset = refine(cost(found.farther[i]), cost(found.best[i]), cost(found.nearer[i]));
+            let steps = (16 * disparity + offset).max(0);
+            // As `DisparityPixel::from_steps`; steps are below 32768 because disparities are below 2048.
+            let bits = if steps == 0 { none(Reason::OutOfRange) } else { steps };
             let bits = if ambiguous { none(Reason::NotUnique) } else { bits };
             // At an end of the range the true minimum may lie beyond, and there is no neighbour to interpolate with.
             let at_end = (disparity >= largest) | (disparity <= smallest);
             let bits = if at_end { none(Reason::OutOfRange) } else { bits };
-            let untold = bits == none(Reason::NotUnique);
-            let low = texture < self.min_texture;
-            let bits = if low { none(Reason::LowTexture) } else { bits };
-            let too_bright = saturated > self.max_saturated;
-            let bits = if too_bright { none(Reason::Saturated) } else { bits };
-            let decided = (largest >= smallest) & (right_first < right_end) & (*weak | !self.only_weak);
-            *out = DisparityPixel::from_bits(if decided { bits as u16 } else { out.bits() });
-            let now_weak = (texture < self.weak_texture) & (low | untold) & !too_bright;
-            *weak = (*weak & self.only_weak) | (decided & now_weak & !self.only_weak);
+            let (texture, saturated) = (sums.0[i] & ((1 << TEXTURE_BITS) - 1), sums.0[i] >> TEXTURE_BITS);
+            let bits = if texture < self.min_texture { none(Reason::LowTexture) } else { bits };
+            let bits = if saturated > self.max_saturated { none(Reason::Saturated) } else { bits };
+            let told_apart = (bits != none(Reason::LowTexture)) & (bits != none(Reason::NotUnique));
+            untold[i] = u8::from(!told_apart & (texture < self.weak_texture));
+            decided[i] = if largest < smallest { 0 } else { bits as u16 };
+        }
+        if search.right_first >= search.right_end {
+            return;
+        }
+        for ((out, weak), (&decided, &untold)) in out.iter_mut().zip(weak).zip(decided.iter().zip(&untold)) {
+            let takes = (decided != 0) & (*weak | !self.only_weak);
+            *out = if takes { DisparityPixel::from_bits(decided) } else { *out };
+            *weak = if self.only_weak { *weak } else { takes & (untold != 0) };
         }
     }
 }
 
 /// Where between its neighbours the least cost lies, 1/16 px towards the nearer one: two lines of the same slope.
 ///
-/// Numerator and denominator are below 2^20, so that the quotient in f32 lies on the same side of every whole number as the true
-/// one: cut off, it is the integer quotient, and vectors of f32 can be divided where integers cannot.
+/// The quotient is at most 8, so four steps of a division by hand find it: vectors have no integer division.
 #[inline(always)]
 pub(crate) fn refine(farther: i32, best: i32, nearer: i32) -> i32 {
     let slope = farther.max(nearer) - best;
-    let scaled = 8 * (farther - nearer);
+    let difference = farther - nearer;
     // Rounds to the nearest, halves away from zero.
-    let half = if scaled < 0 { -(slope / 2) } else { slope / 2 };
-    let quotient = ((scaled + half) as f32 / slope.max(1) as f32) as i32;
-    if slope <= 0 { 0 } else { quotient }
+    let mut rest = 8 * difference.abs() + slope / 2;
+    let mut quotient = 0;
+    for bit in [8, 4, 2, 1] {
+        let fits = rest >= bit * slope;
+        rest -= if fits { bit * slope } else { 0 };
+        quotient += if fits { bit } else { 0 };
+    }
+    let quotient = if slope <= 0 { 0 } else { quotient };
+    if difference < 0 { -quotient } else { quotient }
 }
 
 #[cfg(test)]
@@ -131,9 +146,9 @@ mod tests {
 
     #[test]
     fn the_quotient_is_that_of_integers() {
-        let check = |farther: u32, best: u32, nearer: u32| {
+        let check = |farther: i32, best: i32, nearer: i32| {
             let expected = in_integers(i64::from(farther), i64::from(best), i64::from(nearer));
-            let found = refine(farther as i32, best as i32, nearer as i32);
+            let found = refine(farther, best, nearer);
             assert_eq!(i64::from(found), expected, "{farther} {best} {nearer}");
         };
         // A best cost of 0 loses nothing: only differences count.

@@ -2,10 +2,7 @@
 //!
 //! Every function here is inlined into one that is compiled for the instructions of its vector.
 
-use super::{
-    jobs::{CHUNK, CodeRow, Found, PAD, Right, Search, SlideCodes},
-    plain::{cost_of, key_above},
-};
+use super::jobs::{CHUNK, CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
 
 /// A vector of bytes.
 ///
@@ -130,42 +127,63 @@ unsafe fn slide<V: Vector, const LEAVES: bool>(
 ) {
     // SAFETY: that of this function.
     unsafe {
-        let start = |row: CodeRow<'_>| {
-            let base = row.lead - back;
-            (row.left.as_ptr(), row.low.as_ptr().add(base), row.high.as_ptr().add(base))
-        };
-        let ((left_in, low_in, high_in), (left_out, low_out, high_out)) = (start(enter), start(leave));
+        let (enter, leave) = (Codes::new(enter, back), Codes::new(leave, back));
         let last = stride - V::LANES;
         let tail = mask::<V>(last, 0, disparities);
         for x in 0..width {
-            let code_in = V::code(*left_in.add(x));
-            let code_out = V::code(*left_out.add(x));
+            let codes = [V::code(*enter.left.add(x)), V::code(*leave.left.add(x))];
             let column = columns.as_mut_ptr().add(x * stride);
-            let change = |place: usize| {
-                let change = V::hamming(code_in, low_in.add(x + place), high_in.add(x + place));
-                if LEAVES {
-                    change.sub(V::hamming(code_out, low_out.add(x + place), high_out.add(x + place)))
-                } else {
-                    change
-                }
-            };
             if x >= back {
                 let mut place = 0;
                 while place < last {
-                    V::load(column.add(place)).add(change(place)).store(column.add(place));
+                    let change = change::<V, LEAVES>(codes, &enter, &leave, x + place);
+                    V::load(column.add(place)).add(change).store(column.add(place));
                     place += V::LANES;
                 }
-                V::load(column.add(last)).add(change(last).and(tail)).store(column.add(last));
+                let change = change::<V, LEAVES>(codes, &enter, &leave, x + last).and(tail);
+                V::load(column.add(last)).add(change).store(column.add(last));
             } else {
                 // What lies in front of the row must leave no trace.
                 let mut place = 0;
                 while place < stride {
-                    let change = change(place).and(mask::<V>(place, back - x, disparities));
+                    let change = change::<V, LEAVES>(codes, &enter, &leave, x + place);
+                    let change = change.and(mask::<V>(place, back - x, disparities));
                     V::load(column.add(place)).add(change).store(column.add(place));
                     place += V::LANES;
                 }
             }
         }
+    }
+}
+
+/// Where the codes of a row lie: those of the right row from the one on that place 0 of the first column is compared with.
+struct Codes {
+    left: *const u8,
+    low: *const u8,
+    high: *const u8,
+}
+
+impl Codes {
+    /// # Safety
+    /// `back` must not exceed the lead.
+    #[inline(always)]
+    unsafe fn new(row: CodeRow<'_>, back: usize) -> Self {
+        let base = row.lead - back;
+        // SAFETY: both rows are longer than the lead.
+        unsafe { Self { left: row.left.as_ptr(), low: row.low.as_ptr().add(base), high: row.high.as_ptr().add(base) } }
+    }
+}
+
+/// What the sums change by, from right code `at` on. Not a closure: that would not be compiled for the instructions.
+///
+/// # Safety
+/// That of [`slide`].
+#[inline(always)]
+unsafe fn change<V: Vector, const LEAVES: bool>(codes: [V::Code; 2], enter: &Codes, leave: &Codes, at: usize) -> V {
+    // SAFETY: that of this function.
+    unsafe {
+        let change = V::hamming(codes[0], enter.low.add(at), enter.high.add(at));
+        if LEAVES { change.sub(V::hamming(codes[1], leave.low.add(at), leave.high.add(at))) } else { change }
     }
 }
 
@@ -191,6 +209,7 @@ fn search_fits<V: Vector>(search: &Search, columns: &[u8], work: &[i16], right: 
 #[inline(always)]
 pub(super) unsafe fn search_keys<V: Vector>(
     search: &Search,
+    limits: &KeyLimits,
     columns: &[u8],
     work: &mut [i16],
     right: Right<'_>,
@@ -208,13 +227,13 @@ pub(super) unsafe fn search_keys<V: Vector>(
             begin_keys::<V>(search, columns, keys);
         }
         for x in range.start..inner.start {
-            key_pixel::<V, true>(search, columns, keys, tables, x, found);
+            key_pixel::<V, true>(search, limits, columns, keys, tables, x, found);
         }
         for x in inner.clone() {
-            key_pixel::<V, false>(search, columns, keys, tables, x, found);
+            key_pixel::<V, false>(search, limits, columns, keys, tables, x, found);
         }
         for x in inner.end..range.end {
-            key_pixel::<V, true>(search, columns, keys, tables, x, found);
+            key_pixel::<V, true>(search, limits, columns, keys, tables, x, found);
         }
     }
 }
@@ -230,12 +249,9 @@ unsafe fn begin_keys<V: Vector>(search: &Search, columns: &[u8], keys: *mut i16)
         let nothing = V::Wide::splat(i16::MAX);
         let end = V::Wide::splat((search.disparities as i16).wrapping_add(i16::MIN));
         for first in (0..search.stride).step_by(V::LANES) {
-            let part = |half: usize| {
-                let place = first + half * V::Wide::LANES;
-                V::Wide::load(PLACES.as_ptr()).add(V::Wide::splat((place as i16).wrapping_add(i16::MIN)))
-            };
-            let mut sums = [part(0), part(1)];
-            let inside = sums.map(|keys| end.greater(keys));
+            let places = V::Wide::load(PLACES.as_ptr()).add(V::Wide::splat((first as i16).wrapping_add(i16::MIN)));
+            let mut sums = [places, places.add(V::Wide::splat(V::Wide::LANES as i16))];
+            let inside = [end.greater(sums[0]), end.greater(sums[1])];
             for x in search.range.start - search.radius - 1..search.range.start + search.radius {
                 let [low, high] = V::load(columns.as_ptr().add(x * search.stride + first)).widen_shifted();
                 sums = [sums[0].add(low), sums[1].add(high)];
@@ -253,6 +269,7 @@ unsafe fn begin_keys<V: Vector>(search: &Search, columns: &[u8], keys: *mut i16)
 #[inline(always)]
 unsafe fn key_pixel<V: Vector, const BORDER: bool>(
     search: &Search,
+    limits: &KeyLimits,
     columns: &[u8],
     keys: *mut i16,
     tables: [*mut i16; 2],
@@ -283,19 +300,19 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
         if BORDER && candidates.is_empty() {
             return;
         }
-        let key = least.least();
-        let (cost, place) = (cost_of(key), (key & 0x7f) as usize);
-        let limit = search.limit(cost).min(510);
-        let above = V::Wide::splat(key_above(limit));
+        let least = least.least();
+        let place = (least & 0x7f) as usize;
+        let above = limits.above(least);
+        let bound = V::Wide::splat(above);
         let mut near = V::Wide::splat(0);
         for place in (0..stride).step_by(V::Wide::LANES) {
             let key = V::Wide::load(keys.add(place));
             let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
-            near = near.sub(above.greater(key));
+            near = near.sub(bound.greater(key));
         }
         // There is room on both sides.
-        let [nearer, farther] = [*keys.add(place).sub(1), *keys.add(place + 1)].map(cost_of);
-        found.put(x - search.range.start, place, [nearer, cost, farther], near.sum(), limit);
+        let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
+        found.put(x - search.range.start, place, beside, near.sum() as u16, above);
     }
 }
 
@@ -409,10 +426,9 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
         if BORDER && candidates.is_empty() {
             return;
         }
-        let unbiased = |cost: i16| cost.wrapping_sub(i16::MIN) as u16;
         let cost = least.least();
-        let limit = search.limit(unbiased(cost)).min(u32::from(u16::MAX) - 1);
-        let above = V::Wide::splat((limit as u16 as i16).wrapping_sub(i16::MAX));
+        let above = search.above(cost);
+        let bound = V::Wide::splat(above);
         let best = V::Wide::splat(cost);
         let mut near = V::Wide::splat(0);
         // The first of equal places: those that are not equal are 32767 or so.
@@ -420,13 +436,13 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
         for place in (0..stride).step_by(V::Wide::LANES) {
             let cost = V::Wide::load(costs.add(place));
             let cost = if BORDER { outside_is_nothing::<V>(cost, place, &candidates) } else { cost };
-            near = near.sub(above.greater(cost));
+            near = near.sub(bound.greater(cost));
             let here = places.add(V::Wide::splat(place as i16));
             first = first.min(nothing.xor(nothing.xor(here).and(best.equal(cost))));
         }
         let place = first.least() as usize % stride;
         // There is room on both sides.
-        let [nearer, farther] = [*costs.add(place).sub(1), *costs.add(place + 1)].map(unbiased);
-        found.put(x - search.range.start, place, [nearer, unbiased(cost), farther], near.sum(), limit);
+        let beside = [*costs.add(place).sub(1), cost, *costs.add(place + 1)];
+        found.put(x - search.range.start, place, beside, near.sum() as u16, above);
     }
 }

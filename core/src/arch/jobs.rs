@@ -59,35 +59,71 @@ pub(crate) struct Right<'a> {
 }
 
 /// The best place of each pixel that was searched for, and what is beside it. Nothing is said of pixels without candidates.
+///
+/// Numbers are as the search has them: keys, or costs less 32768. What they mean is worked out for many pixels at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Found {
-    pub(crate) cost: [u16; CHUNK],
-    /// Place of the least cost, the first one of several; the highest bit says that another one not beside it is nearly as good.
+    /// The least one.
+    pub(crate) best: [i16; CHUNK],
+    /// Its place, the first one of several.
     pub(crate) place: [u16; CHUNK],
-    /// Cost one place farther on: at one disparity less.
-    pub(crate) farther: [u16; CHUNK],
-    pub(crate) nearer: [u16; CHUNK],
+    /// One place farther on: at one disparity less.
+    pub(crate) farther: [i16; CHUNK],
+    pub(crate) nearer: [i16; CHUNK],
+    /// The least number that is not nearly as good as the best one.
+    pub(crate) above: [i16; CHUNK],
+    /// Candidates below that, the best one included.
+    pub(crate) near: [u16; CHUNK],
 }
-
-/// Bit of [`Found::place`].
-pub(crate) const AMBIGUOUS: u16 = 0x8000;
 
 impl Found {
     pub(crate) const fn new() -> Self {
-        Self { cost: [0; CHUNK], place: [0; CHUNK], farther: [0; CHUNK], nearer: [0; CHUNK] }
+        let (numbers, counts) = ([0; CHUNK], [0; CHUNK]);
+        Self { best: numbers, place: counts, farther: numbers, nearer: numbers, above: numbers, near: counts }
     }
 
-    /// Writes down the best place of pixel `i` of the chunk. `near` is the number of places whose cost is within what is
-    /// ambiguous, itself included.
+    /// Writes down what was found of pixel `i` of the chunk.
     #[inline(always)]
-    pub(crate) fn put(&mut self, i: usize, place: usize, [nearer, cost, farther]: [u16; 3], near: u32, limit: u32) {
-        let beside = 1 + u32::from(u32::from(nearer) <= limit) + u32::from(u32::from(farther) <= limit);
+    pub(crate) fn put(&mut self, i: usize, place: usize, [nearer, best, farther]: [i16; 3], near: u16, above: i16) {
         let i = i % CHUNK;
-        self.cost[i] = cost;
-        self.place[i] = place as u16 | if near > beside { AMBIGUOUS } else { 0 };
+        self.best[i] = best;
+        self.place[i] = place as u16;
         self.farther[i] = farther;
         self.nearer[i] = nearer;
+        self.above[i] = above;
+        self.near[i] = near;
     }
+}
+
+/// For each cost below 512 the least key that is not nearly as good.
+#[derive(Clone, Debug)]
+pub(crate) struct KeyLimits([i16; KEY_COSTS]);
+
+/// Costs that a key has room for. The largest one is that of no candidate.
+pub(crate) const KEY_COSTS: usize = 512;
+
+impl KeyLimits {
+    pub(crate) const fn new() -> Self {
+        Self([0; KEY_COSTS])
+    }
+
+    pub(crate) fn fill(&mut self, uniqueness_percent: u16) {
+        for (cost, above) in (0..).zip(&mut self.0) {
+            // Costs reach 510 at most.
+            *above = (((limit(cost, uniqueness_percent).min(510) + 1) << 7) as u16 as i16).wrapping_add(i16::MIN);
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn above(&self, key: i16) -> i16 {
+        self.0[usize::from(key.wrapping_sub(i16::MIN) as u16 >> 7)]
+    }
+}
+
+/// The largest cost that is nearly as good as `cost`. No sum under a window exceeds 16 bits.
+#[inline(always)]
+fn limit(cost: u16, uniqueness_percent: u16) -> u32 {
+    u32::from(cost) * (100 + u32::from(uniqueness_percent)) / 100
 }
 
 impl Search {
@@ -113,9 +149,10 @@ impl Search {
         first..end.clamp(first, self.range.end)
     }
 
-    /// The largest cost that is nearly as good as `cost`. No sum under a window exceeds 16 bits.
+    /// The least number, a cost less 32768, that is not nearly as good as `best`.
     #[inline(always)]
-    pub(crate) fn limit(&self, cost: u16) -> u32 {
-        u32::from(cost) * (100 + u32::from(self.uniqueness_percent)) / 100
+    pub(crate) fn above(&self, best: i16) -> i16 {
+        let limit = limit(best.wrapping_sub(i16::MIN) as u16, self.uniqueness_percent).min(u32::from(u16::MAX) - 1);
+        (limit as u16 as i16).wrapping_sub(i16::MAX)
     }
 }

@@ -17,8 +17,8 @@ mod plain;
 #[expect(unsafe_code, reason = "instructions that not every processor has, used where it has them")]
 mod x86_64;
 
-pub(crate) use decide::{Decide, Sums, refine};
-pub(crate) use jobs::{CHUNK, CodeRow, Found, PAD, Right, Search, SlideCodes};
+pub(crate) use decide::{Decide, Sums, evidence, refine};
+pub(crate) use jobs::{CHUNK, CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
 
 use crate::disparity::DisparityPixel;
 
@@ -133,6 +133,7 @@ pub(crate) fn slide_grey(
 pub(crate) fn search_keys(
     chosen: Chosen,
     search: &Search,
+    limits: &KeyLimits,
     columns: &[u8],
     work: &mut [i16],
     right: Right<'_>,
@@ -141,9 +142,9 @@ pub(crate) fn search_keys(
     match chosen.0 {
         #[cfg(target_arch = "x86_64")]
         Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
-            x86_64::search_keys(chosen, search, columns, work, right, found);
+            x86_64::search_keys(chosen, search, limits, columns, work, right, found);
         }
-        _ => plain::search_keys(search, columns, work, right, found),
+        _ => plain::search_keys(search, limits, columns, work, right, found),
     }
 }
 

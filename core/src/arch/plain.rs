@@ -1,6 +1,6 @@
 //! Plain Rust: what every other backend is held against.
 
-use super::jobs::{CodeRow, Found, PAD, Right, Search, SlideCodes};
+use super::jobs::{CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
 
 /// A sum over the rows of a window as it lies in a column.
 pub(super) trait Sum: Copy {
@@ -84,7 +84,14 @@ fn slide<S: Copy>(
     }
 }
 
-pub(super) fn search_keys(search: &Search, columns: &[u8], work: &mut [i16], right: Right<'_>, found: &mut Found) {
+pub(super) fn search_keys(
+    search: &Search,
+    limits: &KeyLimits,
+    columns: &[u8],
+    work: &mut [i16],
+    right: Right<'_>,
+    found: &mut Found,
+) {
     let disparities = search.disparities;
     let Some(keys) = work.get_mut(PAD..PAD + disparities) else { return };
     let column =
@@ -114,25 +121,12 @@ pub(super) fn search_keys(search: &Search, columns: &[u8], work: &mut [i16], rig
         for (best, &key) in table.get_mut(partner..).unwrap_or_default().iter_mut().zip(inside) {
             *best = (*best).min(key ^ 0x7f);
         }
-        let (cost, place) = (cost_of(least), usize::from(least as u16 & 0x7f));
-        let limit = search.limit(cost).min(510);
-        let above = key_above(limit);
+        let place = usize::from(least as u16 & 0x7f);
+        let above = limits.above(least);
         let near = inside.iter().fold(0u16, |near, &key| near + u16::from(key < above));
-        let at = |place: Option<usize>| place.and_then(|place| keys.get(place)).map_or(u16::MAX, |&key| cost_of(key));
-        found.put(i, place, [at(place.checked_sub(1)), cost, at(Some(place + 1))], u32::from(near), limit);
+        let at = |place: Option<usize>| place.and_then(|place| keys.get(place)).copied().unwrap_or(i16::MAX);
+        found.put(i, place, [at(place.checked_sub(1)), least, at(Some(place + 1))], near, above);
     }
-}
-
-/// The cost in a key.
-#[inline(always)]
-pub(super) const fn cost_of(key: i16) -> u16 {
-    (key.wrapping_sub(i16::MIN) as u16) >> 7
-}
-
-/// The least key whose cost is above `limit`, which is at most 510.
-#[inline(always)]
-pub(super) const fn key_above(limit: u32) -> i16 {
-    (((limit + 1) << 7) as u16 as i16).wrapping_add(i16::MIN)
 }
 
 /// Costs are kept less 32768, because some processors compare signed numbers only.
@@ -169,14 +163,10 @@ pub(super) fn search_costs<S: Sum>(
         }
         let least = inside.iter().fold(i16::MAX, |least, &cost| least.min(cost));
         let place = candidates.start + inside.iter().position(|&cost| cost == least).unwrap_or(0);
-        let unbiased = |cost: i16| cost.wrapping_sub(i16::MIN) as u16;
-        let limit = search.limit(unbiased(least)).min(u32::from(u16::MAX) - 1);
-        let above = (limit as u16 as i16).wrapping_sub(i16::MAX);
+        let above = search.above(least);
         let near = inside.iter().fold(0u16, |near, &cost| near + u16::from(cost < above));
-        let at =
-            |place: Option<usize>| place.and_then(|place| costs.get(place)).map_or(u16::MAX, |&cost| unbiased(cost));
-        let beside = [at(place.checked_sub(1)), unbiased(least), at(Some(place + 1))];
-        found.put(i, place, beside, u32::from(near), limit);
+        let at = |place: Option<usize>| place.and_then(|place| costs.get(place)).copied().unwrap_or(i16::MAX);
+        found.put(i, place, [at(place.checked_sub(1)), least, at(Some(place + 1))], near, above);
     }
 }
 

@@ -3,6 +3,9 @@
 use super::plan::Plan;
 use crate::arch::Right;
 
+/// Where nothing was offered: farther from any disparity than a check back allows.
+pub(super) const NO_PARTNER: u16 = i16::MAX as u16;
+
 /// Two tables for the backends; see [`Right`].
 ///
 /// A left pixel touches `stride` places of a table, the next one those beside them. With keys each of the two tables serves every
@@ -10,11 +13,12 @@ use crate::arch::Right;
 pub(super) struct RightBest<const WIDTH: usize> {
     /// Room for two tables of half as many pixels more than the width: what a backend may touch beyond the row.
     tables: [[i16; 3]; WIDTH],
+    disparities: [u16; WIDTH],
 }
 
 impl<const WIDTH: usize> RightBest<WIDTH> {
     pub(super) const fn new() -> Self {
-        Self { tables: [[0; 3]; WIDTH] }
+        Self { tables: [[0; 3]; WIDTH], disparities: [0; WIDTH] }
     }
 
     pub(super) fn begin(&mut self) {
@@ -26,17 +30,26 @@ impl<const WIDTH: usize> RightBest<WIDTH> {
         Right { tables: [first, second], lead }
     }
 
-    /// Disparity of the cheapest partner of right pixel `x`, if it has one.
-    #[inline(always)]
-    pub(super) fn disparity(&self, x: usize, plan: &Plan) -> Option<u16> {
-        let (first, second) = self.tables.as_flattened().split_at(WIDTH + WIDTH / 2);
-        let (first, second) = (*first.get(x + plan.lead)?, *second.get(x + plan.lead)?);
+    /// Disparity of the cheapest partner of each right pixel, or [`NO_PARTNER`].
+    ///
+    /// # Bound
+    /// One step for each pixel.
+    pub(super) fn disparities(&mut self, plan: &Plan) -> &[u16] {
+        let (first, second) = self.tables.as_flattened_mut().split_at_mut(WIDTH + WIDTH / 2);
+        let (first, second) =
+            (first.get_mut(plan.lead..).unwrap_or_default(), second.get(plan.lead..).unwrap_or_default());
         if plan.keys {
-            // No cost is 511.
-            let key = first.min(second);
-            (key < 0x7f80).then(|| (key as u16 & 0x7f).wrapping_add(plan.key_disparity))
+            for ((disparity, first), &second) in self.disparities.iter_mut().zip(&*first).zip(second) {
+                let key = second.min(*first);
+                // No cost is 511.
+                let told = (key as u16 & 0x7f).wrapping_add(plan.key_disparity);
+                *disparity = if key < 0x7f80 { told } else { NO_PARTNER };
+            }
         } else {
-            (second != i16::MAX).then_some(second as u16)
+            for (disparity, &told) in self.disparities.iter_mut().zip(second) {
+                *disparity = told as u16;
+            }
         }
+        &self.disparities
     }
 }

@@ -1,14 +1,14 @@
 //! Sums over the height of the window, for each column and disparity.
 
 use super::rows::SATURATED_FLAG;
-use crate::arch::{self, Chosen, CodeRow, SlideCodes};
+use crate::arch::{self, Chosen, CodeRow, SlideCodes, evidence};
 
 /// For each column of the left picture, the sums over the rows under the window: differences for each disparity
 /// (largest disparity first, so that the right pixels lie in the order of memory), texture, saturated pixels.
 pub(super) struct Columns<const WIDTH: usize, const DISPARITIES: usize> {
     costs: Costs<WIDTH, DISPARITIES>,
-    texture: [u16; WIDTH],
-    saturated: [u16; WIDTH],
+    /// Texture and saturated pixels; see [`evidence`].
+    evidence: [u32; WIDTH],
 }
 
 /// Sums of Hamming distances fit bytes and are kept closely, `stride` of them for each column; sums of absolute differences take
@@ -18,13 +18,12 @@ struct Costs<const WIDTH: usize, const DISPARITIES: usize>([[[u8; 2]; DISPARITIE
 
 impl<const WIDTH: usize, const DISPARITIES: usize> Columns<WIDTH, DISPARITIES> {
     pub(super) const fn new() -> Self {
-        Self { costs: Costs([[[0; 2]; DISPARITIES]; WIDTH]), texture: [0; WIDTH], saturated: [0; WIDTH] }
+        Self { costs: Costs([[[0; 2]; DISPARITIES]; WIDTH]), evidence: [0; WIDTH] }
     }
 
     pub(super) fn begin(&mut self) {
         self.costs.0.as_flattened_mut().as_flattened_mut().fill(0);
-        self.texture.fill(0);
-        self.saturated.fill(0);
+        self.evidence.fill(0);
     }
 
     /// Sums of Hamming distances.
@@ -37,12 +36,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Columns<WIDTH, DISPARITIES> {
         self.costs.0.as_flattened()
     }
 
-    pub(super) const fn texture(&self) -> &[u16] {
-        &self.texture
-    }
-
-    pub(super) const fn saturated(&self) -> &[u16] {
-        &self.saturated
+    pub(super) const fn evidence(&self) -> &[u32] {
+        &self.evidence
     }
 
     /// Lets row `enter` of the evidence in and row `leave` out.
@@ -50,17 +45,12 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Columns<WIDTH, DISPARITIES> {
     /// # Bound
     /// `width` steps.
     pub(super) fn slide_evidence(&mut self, enter: &[u8], leave: Option<&[u8]>) {
-        let response = |evidence: u8| u16::from(evidence & !SATURATED_FLAG);
-        let saturated = |evidence: u8| u16::from(evidence / SATURATED_FLAG);
-        for ((texture, count), &enter) in self.texture.iter_mut().zip(&mut self.saturated).zip(enter) {
-            *texture = texture.wrapping_add(response(enter));
-            *count = count.wrapping_add(saturated(enter));
+        let of = |byte: u8| evidence(byte & !SATURATED_FLAG, byte & SATURATED_FLAG != 0);
+        for (sum, &enter) in self.evidence.iter_mut().zip(enter) {
+            *sum = sum.wrapping_add(of(enter));
         }
-        for ((texture, count), &leave) in
-            self.texture.iter_mut().zip(&mut self.saturated).zip(leave.unwrap_or_default())
-        {
-            *texture = texture.wrapping_sub(response(leave));
-            *count = count.wrapping_sub(saturated(leave));
+        for (sum, &leave) in self.evidence.iter_mut().zip(leave.unwrap_or_default()) {
+            *sum = sum.wrapping_sub(of(leave));
         }
     }
 

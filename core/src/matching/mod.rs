@@ -18,11 +18,11 @@ pub use settings::{MatchCost, MatchSettings, Prefilter};
 pub(crate) use strip::Strip;
 
 use crate::{
-    arch::{self, Backend, CHUNK, Decide, Found, Search, Sums},
+    arch::{self, Backend, CHUNK, Decide, Found, KeyLimits, Search, Sums},
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
 };
-use best::RightBest;
+use best::{NO_PARTNER, RightBest};
 use columns::Columns;
 use plan::Plan;
 use rows::Rows;
@@ -50,6 +50,7 @@ pub struct Matcher<const WIDTH: usize, const DISPARITIES: usize> {
     weak: [bool; WIDTH],
     /// Sums under the window at the current pixel, largest disparity first, with room around them.
     work: [[i16; 4]; DISPARITIES],
+    key_limits: KeyLimits,
     found: Found,
     sums: Sums,
 }
@@ -69,6 +70,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             right: RightBest::new(),
             weak: [false; WIDTH],
             work: [[0; 4]; DISPARITIES],
+            key_limits: KeyLimits::new(),
             found: Found::new(),
             sums: Sums::new(),
         }
@@ -108,6 +110,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         self.settings = *settings;
         let backend = if self.is_forced { self.backend } else { Backend::fastest() };
         self.plan = Plan::new::<WIDTH, DISPARITIES>(backend, settings, width);
+        self.key_limits.fill(settings.uniqueness_percent);
         self.width = width;
         self.height = height;
         self.begin();
@@ -217,6 +220,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             max_saturated: area * u32::from(settings.saturated_percent) / 100,
             unique: uniqueness_percent > 0,
             only_weak: window == Window::Wide,
+            keys: window == Window::Narrow && self.plan.keys,
         };
         let mut search = Search {
             range: first..first,
@@ -243,7 +247,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             search.follows = search.range.end == next.start && !search.range.is_empty();
             search.range = next.start..next.end.min(next.start + CHUNK);
             self.search(&search, window);
-            self.sums.make(&search, self.columns.texture(), self.columns.saturated());
+            self.sums.make(&search, self.columns.evidence());
             let chunk = search.range.clone();
             let (Some(out), Some(weak)) = (out.get_mut(chunk.clone()), self.weak.get_mut(chunk)) else { break };
             arch::decide(self.plan.chosen, &decide, &search, &self.found, &self.sums, out, weak);
@@ -279,7 +283,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         let lent = right.lend(plan.lead);
         match (self.settings.cost, window) {
             (MatchCost::Census, Window::Narrow) if plan.keys => {
-                arch::search_keys(plan.chosen, search, columns.bytes(), work, lent, found);
+                arch::search_keys(plan.chosen, search, &self.key_limits, columns.bytes(), work, lent, found);
             }
             (MatchCost::Census, _) => {
                 let right = (window == Window::Narrow).then_some(lent);
@@ -292,16 +296,16 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     }
 
     /// Takes out pixels whose right partner matches another left pixel better.
-    fn back_check(&self, out: &mut [DisparityPixel], first: usize) {
-        let tolerance = i32::from(self.settings.back_check_px);
+    fn back_check(&mut self, out: &mut [DisparityPixel], first: usize) {
+        let tolerance = self.settings.back_check_px;
+        let right = self.right.disparities(&self.plan);
         for (x, pixel) in (first..).zip(out) {
             // Rounding to the nearest pixel may be one off the place that was chosen: half a pixel is shared.
-            let disparity = usize::from((pixel.steps() + 8) >> 4);
-            let back = x.checked_sub(disparity).and_then(|x| self.right.disparity(x, &self.plan));
-            let leads_back = back.is_some_and(|back| (i32::from(back) - disparity as i32).abs() <= tolerance);
-            if pixel.has_value() && !leads_back {
-                *pixel = DisparityPixel::none(Reason::LeftRightMismatch);
-            }
+            let disparity = (pixel.steps() + 8) >> 4;
+            let back = right.get(x.wrapping_sub(usize::from(disparity))).copied().unwrap_or(NO_PARTNER);
+            let leads_back = back.abs_diff(disparity) <= tolerance;
+            *pixel =
+                if pixel.has_value() & !leads_back { DisparityPixel::none(Reason::LeftRightMismatch) } else { *pixel };
         }
     }
 }

@@ -8,7 +8,7 @@ use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
 use super::{
     Backend, Chosen, Decide, Sums, generic,
-    jobs::{Found, Right, Search, SlideCodes},
+    jobs::{Found, KeyLimits, Right, Search, SlideCodes},
 };
 use crate::disparity::DisparityPixel;
 use avx2::Avx2;
@@ -67,9 +67,16 @@ macro_rules! functions {
         }
 
         #[target_feature(enable = $features)]
-        fn $keys(search: &Search, columns: &[u8], work: &mut [i16], right: Right<'_>, found: &mut Found) {
+        fn $keys(
+            search: &Search,
+            limits: &KeyLimits,
+            columns: &[u8],
+            work: &mut [i16],
+            right: Right<'_>,
+            found: &mut Found,
+        ) {
             // SAFETY: this function is only called where the instructions are.
-            unsafe { generic::search_keys::<$vector>(search, columns, work, right, found) }
+            unsafe { generic::search_keys::<$vector>(search, limits, columns, work, right, found) }
         }
 
         #[target_feature(enable = $features)]
@@ -100,6 +107,7 @@ pub(super) fn slide_codes(chosen: Chosen, job: SlideCodes<'_>) {
 pub(super) fn search_keys(
     chosen: Chosen,
     search: &Search,
+    limits: &KeyLimits,
     columns: &[u8],
     work: &mut [i16],
     right: Right<'_>,
@@ -108,9 +116,9 @@ pub(super) fn search_keys(
     // SAFETY: as in `slide_codes`.
     unsafe {
         match chosen.backend() {
-            Backend::Avx2 => keys_avx2(search, columns, work, right, found),
-            Backend::Sse41 => keys_sse41(search, columns, work, right, found),
-            Backend::Plain | Backend::Sse2 => keys_sse2(search, columns, work, right, found),
+            Backend::Avx2 => keys_avx2(search, limits, columns, work, right, found),
+            Backend::Sse41 => keys_sse41(search, limits, columns, work, right, found),
+            Backend::Plain | Backend::Sse2 => keys_sse2(search, limits, columns, work, right, found),
         }
     }
 }

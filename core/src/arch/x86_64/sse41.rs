@@ -60,8 +60,9 @@ impl Vector for Sse41 {
 
     #[inline(always)]
     unsafe fn code(code: u8) -> [__m128i; 2] {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { [code & 15, code >> 4].map(|four| _mm_loadu_si128(DIFFERENT[usize::from(four)].as_ptr().cast())) }
+        let [low, high] = [&DIFFERENT[usize::from(code & 15)], &DIFFERENT[usize::from(code >> 4)]];
+        // SAFETY: the caller guarantees the instructions.
+        unsafe { [_mm_loadu_si128(low.as_ptr().cast()), _mm_loadu_si128(high.as_ptr().cast())] }
     }
 
     /// Bits are looked up, four at a time.
@@ -80,7 +81,7 @@ impl Vector for Sse41 {
         // SAFETY: the caller guarantees the instructions and what lies behind pointers.
         unsafe {
             let zero = _mm_setzero_si128();
-            [_mm_unpacklo_epi8(self.0, zero), _mm_unpackhi_epi8(self.0, zero)].map(|words| Words41(Words(words)))
+            [Words41(Words(_mm_unpacklo_epi8(self.0, zero))), Words41(Words(_mm_unpackhi_epi8(self.0, zero)))]
         }
     }
 
@@ -91,7 +92,7 @@ impl Vector for Sse41 {
         unsafe {
             let zero = _mm_setzero_si128();
             let [low, high] = [_mm_unpacklo_epi8(zero, self.0), _mm_unpackhi_epi8(zero, self.0)];
-            [low, high].map(|words| Words41(Words(_mm_srai_epi16(words, 1))))
+            [Words41(Words(_mm_srai_epi16::<1>(low))), Words41(Words(_mm_srai_epi16::<1>(high)))]
         }
     }
 }
