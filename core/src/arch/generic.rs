@@ -109,17 +109,26 @@ pub(super) unsafe fn slide_codes<V: Vector>(job: SlideCodes<'_>) {
     // SAFETY: column x has `stride` sums from `x * stride` on, and the right codes for it are read from `lead + x - back` on,
     // as many: all of that was seen to lie in the slices. The caller guarantees the instructions.
     unsafe {
-        match leave {
-            Some(leave) => slide::<V, true>(columns, [width, stride, disparities, back], enter, leave),
-            None => slide::<V, false>(columns, [width, stride, disparities, back], enter, enter),
+        let sizes = [width, stride, disparities, back];
+        let Some(leave) = leave else { return slide::<V, false, 0>(columns, sizes, enter, enter) };
+        match stride / V::LANES {
+            1 => slide::<V, true, 1>(columns, sizes, enter, leave),
+            2 => slide::<V, true, 2>(columns, sizes, enter, leave),
+            3 => slide::<V, true, 3>(columns, sizes, enter, leave),
+            4 => slide::<V, true, 4>(columns, sizes, enter, leave),
+            6 => slide::<V, true, 6>(columns, sizes, enter, leave),
+            8 => slide::<V, true, 8>(columns, sizes, enter, leave),
+            _ => slide::<V, true, 0>(columns, sizes, enter, leave),
         }
     }
 }
 
+/// A column takes `BLOCKS` vectors; 0 for any number.
+///
 /// # Safety
 /// That of [`slide_codes`], which has seen that everything lies in the slices.
 #[inline(always)]
-unsafe fn slide<V: Vector, const LEAVES: bool>(
+unsafe fn slide<V: Vector, const LEAVES: bool, const BLOCKS: usize>(
     columns: &mut [u8],
     [width, stride, disparities, back]: [usize; 4],
     enter: CodeRow<'_>,
@@ -128,6 +137,7 @@ unsafe fn slide<V: Vector, const LEAVES: bool>(
     // SAFETY: that of this function.
     unsafe {
         let (enter, leave) = (Codes::new(enter, back), Codes::new(leave, back));
+        let stride = if BLOCKS == 0 { stride } else { BLOCKS * V::LANES };
         let last = stride - V::LANES;
         let tail = mask::<V>(last, 0, disparities);
         for x in 0..width {
@@ -229,8 +239,18 @@ pub(super) unsafe fn search_keys<V: Vector>(
         for x in range.start..inner.start {
             key_pixel::<V, true>(search, limits, columns, keys, tables, x, found);
         }
-        for x in inner.clone() {
-            key_pixel::<V, false>(search, limits, columns, keys, tables, x, found);
+        match search.stride / V::LANES {
+            1 => key_run::<V, 1>(search, limits, columns, keys, tables, inner.clone(), found),
+            2 => key_run::<V, 2>(search, limits, columns, keys, tables, inner.clone(), found),
+            3 => key_run::<V, 3>(search, limits, columns, keys, tables, inner.clone(), found),
+            4 => key_run::<V, 4>(search, limits, columns, keys, tables, inner.clone(), found),
+            6 => key_run::<V, 6>(search, limits, columns, keys, tables, inner.clone(), found),
+            8 => key_run::<V, 8>(search, limits, columns, keys, tables, inner.clone(), found),
+            _ => {
+                for x in inner.clone() {
+                    key_pixel::<V, false>(search, limits, columns, keys, tables, x, found);
+                }
+            }
         }
         for x in inner.end..range.end {
             key_pixel::<V, true>(search, limits, columns, keys, tables, x, found);
@@ -313,6 +333,72 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
         // There is room on both sides.
         let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
         found.put(x - search.range.start, place, beside, near.sum() as u16, above);
+    }
+}
+
+/// Pixels that have all candidates, with columns of `BLOCKS` vectors: as [`key_pixel`], without loops, and with the keys in
+/// registers where there are enough of them.
+///
+/// # Safety
+/// That of [`search_keys`], and that [`search_fits`].
+#[inline(always)]
+unsafe fn key_run<V: Vector, const BLOCKS: usize>(
+    search: &Search,
+    limits: &KeyLimits,
+    columns: &[u8],
+    keys: *mut i16,
+    tables: [*mut i16; 2],
+    range: core::ops::Range<usize>,
+    found: &mut Found,
+) {
+    // SAFETY: that of this function.
+    unsafe {
+        let stride = BLOCKS * V::LANES;
+        let kept = BLOCKS <= 4;
+        let turn = V::Wide::splat(0x7f);
+        let mut current = [[V::Wide::splat(0); 2]; BLOCKS];
+        if kept {
+            for block in 0..BLOCKS {
+                let at = keys.add(block * V::LANES);
+                current[block] = [V::Wide::load(at), V::Wide::load(at.add(V::Wide::LANES))];
+            }
+        }
+        for x in range {
+            let enter = columns.as_ptr().add((x + search.radius) * stride);
+            let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+            let table = tables[x % 2].add(x);
+            let mut least = V::Wide::splat(i16::MAX);
+            for block in 0..BLOCKS {
+                let first = block * V::LANES;
+                let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_shifted();
+                for half in 0..2 {
+                    let place = first + half * V::Wide::LANES;
+                    let before = if kept { current[block][half] } else { V::Wide::load(keys.add(place)) };
+                    let key = before.add(change[half]);
+                    if kept {
+                        current[block][half] = key;
+                    }
+                    key.store(keys.add(place));
+                    least = least.min(key);
+                    V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
+                }
+            }
+            let least = least.least();
+            let place = (least & 0x7f) as usize;
+            let above = limits.above(least);
+            let bound = V::Wide::splat(above);
+            let mut near = V::Wide::splat(0);
+            for block in 0..BLOCKS {
+                for half in 0..2 {
+                    let place = block * V::LANES + half * V::Wide::LANES;
+                    let key = if kept { current[block][half] } else { V::Wide::load(keys.add(place)) };
+                    near = near.sub(bound.greater(key));
+                }
+            }
+            // There is room on both sides.
+            let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
+            found.put(x - search.range.start, place, beside, near.sum() as u16, above);
+        }
     }
 }
 

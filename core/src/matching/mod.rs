@@ -236,16 +236,17 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if window == Window::Narrow {
             self.right.begin();
         }
-        while search.range.end < end {
-            let next = match window {
-                Window::Narrow => search.range.end..end,
-                Window::Wide => self.weak_run(search.range.end..end, radius),
-            };
-            if next.is_empty() {
+        let mut run = first..if window == Window::Narrow { end } else { first };
+        loop {
+            if run.is_empty() && window == Window::Wide {
+                run = self.weak_run(run.end..end, radius);
+            }
+            if run.is_empty() {
                 break;
             }
-            search.follows = search.range.end == next.start && !search.range.is_empty();
-            search.range = next.start..next.end.min(next.start + CHUNK);
+            search.follows = search.range.end == run.start && !search.range.is_empty();
+            search.range = run.start..run.end.min(run.start + CHUNK);
+            run.start = search.range.end;
             self.search(&search, window);
             self.sums.make(&search, self.columns.evidence());
             let chunk = search.range.clone();
@@ -261,7 +262,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     /// none.
     fn weak_run(&self, range: core::ops::Range<usize>, radius: usize) -> core::ops::Range<usize> {
         let weak = self.weak.get(range.clone()).unwrap_or_default();
-        let Some(skipped) = weak.iter().position(|&weak| weak) else { return range.end..range.end };
+        let Some(skipped) = first_weak(weak) else { return range.end..range.end };
         let (mut end, mut gap) = (skipped, 0);
         for (i, &weak) in weak.iter().enumerate().skip(skipped) {
             if weak {
@@ -308,6 +309,14 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
                 if pixel.has_value() & !leads_back { DisparityPixel::none(Reason::LeftRightMismatch) } else { *pixel };
         }
     }
+}
+
+/// The first weak pixel; most blocks have none.
+fn first_weak(weak: &[bool]) -> Option<usize> {
+    const BLOCK: usize = 32;
+    let some = |block: &[bool]| block.iter().fold(false, |some, &weak| some | weak);
+    let (block, pixels) = weak.chunks(BLOCK).enumerate().find(|(_, block)| some(block))?;
+    Some(block * BLOCK + pixels.iter().position(|&weak| weak)?)
 }
 
 /// Which of the two windows a row is matched with.
