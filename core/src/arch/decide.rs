@@ -114,6 +114,35 @@ impl Decide {
     }
 }
 
+/// A right pixel that nothing was offered to: farther from any disparity than a check back allows.
+pub(crate) const NO_PARTNER: u16 = i16::MAX as u16;
+
+/// Takes out pixels whose right partner matches another left pixel better. `out` begins at pixel `first`; `right` says for each
+/// right pixel at which disparity it matches best.
+///
+/// # Bound
+/// A fixed number of steps for each pixel.
+#[inline(always)]
+pub(crate) fn back_check(tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[u16]) {
+    let mismatch = DisparityPixel::none(Reason::LeftRightMismatch).bits();
+    for (start, out) in (first..).step_by(CHUNK).zip(out.chunks_mut(CHUNK)) {
+        let (mut disparities, mut back) = ([0u16; CHUNK], [0u16; CHUNK]);
+        for (disparity, pixel) in disparities.iter_mut().zip(&*out) {
+            // Rounding to the nearest pixel may be one off the place that was chosen: half a pixel is shared.
+            *disparity = ((pixel.bits() & 0x7fff) + 8) >> 4;
+        }
+        // What is told here of pixels without a disparity does not matter.
+        for ((back, &disparity), x) in back.iter_mut().zip(&disparities).zip(start..) {
+            *back = right.get(x.wrapping_sub(usize::from(disparity))).copied().unwrap_or(NO_PARTNER);
+        }
+        for (pixel, (&disparity, &back)) in out.iter_mut().zip(disparities.iter().zip(&back)) {
+            let away = back.max(disparity) - back.min(disparity);
+            let refused = pixel.has_value() & (away > tolerance);
+            *pixel = DisparityPixel::from_bits(if refused { mismatch } else { pixel.bits() });
+        }
+    }
+}
+
 /// Where between its neighbours the least cost lies, 1/16 px towards the nearer one: two lines of the same slope.
 ///
 /// The quotient is at most 8, so four steps of a division by hand find it: vectors have no integer division.

@@ -27,6 +27,8 @@ pub(super) trait Vector: Copy {
     unsafe fn hamming(code: Self::Code, low: *const u8, high: *const u8) -> Self;
     /// Numbers without sign, in order.
     unsafe fn widen(self) -> [Self::Wide; 2];
+    /// Numbers with a sign, in order.
+    unsafe fn widen_signed(self) -> [Self::Wide; 2];
     /// 128 times numbers with a sign, in order.
     unsafe fn widen_shifted(self) -> [Self::Wide; 2];
 }
@@ -52,6 +54,10 @@ pub(super) trait Wide: Copy {
     unsafe fn greater(self, other: Self) -> Self;
     unsafe fn equal(self, other: Self) -> Self;
     unsafe fn least(self) -> i16;
+    /// The first place at which both hold the same; there must be one.
+    unsafe fn first_equal(self, other: Self) -> usize;
+    /// 16 times each.
+    unsafe fn times_16(self) -> Self;
     /// The sum of numbers from 0 to 255.
     unsafe fn sum(self) -> u32;
 }
@@ -79,6 +85,9 @@ static PLACES: [i16; WIDEST / 2] = {
 };
 
 const WIDEST: usize = 64;
+
+/// What stands where there is no disparity, between the costs of bytes, less 32768; 16 times this is still a large number.
+const NO_COST: i16 = 0x07ff;
 
 /// A mask for the lanes from place `place` on: lets places through from `first` up to `end`.
 #[inline(always)]
@@ -328,11 +337,11 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
         for place in (0..stride).step_by(V::Wide::LANES) {
             let key = V::Wide::load(keys.add(place));
             let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
-            near = near.sub(bound.greater(key));
+            near = near.add(bound.greater(key));
         }
         // There is room on both sides.
         let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
-        found.put(x - search.range.start, place, beside, near.sum() as u16, above);
+        found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
     }
 }
 
@@ -392,12 +401,12 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
                 for half in 0..2 {
                     let place = block * V::LANES + half * V::Wide::LANES;
                     let key = if kept { current[block][half] } else { V::Wide::load(keys.add(place)) };
-                    near = near.sub(bound.greater(key));
+                    near = near.add(bound.greater(key));
                 }
             }
             // There is room on both sides.
             let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
-            found.put(x - search.range.start, place, beside, near.sum() as u16, above);
+            found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
         }
     }
 }
@@ -441,6 +450,17 @@ pub(super) unsafe fn search_costs<V: Vector>(
         if !search.follows {
             begin_costs::<V>(search, columns, costs);
         }
+        if search.is_small && tables.is_none() && inner == search.range {
+            match search.stride / V::LANES {
+                1 => return cost_run::<V, 1>(search, columns, costs, found),
+                2 => return cost_run::<V, 2>(search, columns, costs, found),
+                3 => return cost_run::<V, 3>(search, columns, costs, found),
+                4 => return cost_run::<V, 4>(search, columns, costs, found),
+                6 => return cost_run::<V, 6>(search, columns, costs, found),
+                8 => return cost_run::<V, 8>(search, columns, costs, found),
+                _ => (),
+            }
+        }
         for x in search.range.clone() {
             if inner.contains(&x) {
                 cost_pixel::<V, false>(search, columns, costs, tables, x, found);
@@ -465,7 +485,9 @@ unsafe fn begin_costs<V: Vector>(search: &Search, columns: &[u8], costs: *mut i1
             }
             for half in 0..2 {
                 let place = first + half * V::Wide::LANES;
-                outside_is_nothing::<V>(sums[half], place, &(0..search.disparities)).store(costs.add(place));
+                let inside = outside_is_nothing::<V>(sums[half], place, &(0..search.disparities));
+                // Sums of bytes under a window are all below this.
+                inside.min(V::Wide::splat(NO_COST)).store(costs.add(place));
             }
         }
     }
@@ -522,13 +544,60 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
         for place in (0..stride).step_by(V::Wide::LANES) {
             let cost = V::Wide::load(costs.add(place));
             let cost = if BORDER { outside_is_nothing::<V>(cost, place, &candidates) } else { cost };
-            near = near.sub(bound.greater(cost));
+            near = near.add(bound.greater(cost));
             let here = places.add(V::Wide::splat(place as i16));
             first = first.min(nothing.xor(nothing.xor(here).and(best.equal(cost))));
         }
         let place = first.least() as usize % stride;
         // There is room on both sides.
         let beside = [*costs.add(place).sub(1), cost, *costs.add(place + 1)];
-        found.put(x - search.range.start, place, beside, near.sum() as u16, above);
+        found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
+    }
+}
+
+/// Pixels that have all candidates, with columns of `BLOCKS` vectors and costs of at most 2040: as [`cost_pixel`], but cost and
+/// number of the vector go together through the search, and only the place in the vector is left to find.
+///
+/// # Safety
+/// That of [`search_costs`], and that [`search_fits`].
+#[inline(always)]
+unsafe fn cost_run<V: Vector, const BLOCKS: usize>(
+    search: &Search,
+    columns: &[u8],
+    costs: *mut i16,
+    found: &mut Found,
+) {
+    // SAFETY: that of this function.
+    unsafe {
+        let stride = BLOCKS * V::LANES;
+        for x in search.range.clone() {
+            let enter = columns.as_ptr().add((x + search.radius) * stride);
+            let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+            let mut least = V::Wide::splat(i16::MAX);
+            for block in 0..BLOCKS {
+                let first = block * V::LANES;
+                let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_signed();
+                for half in 0..2 {
+                    let place = first + half * V::Wide::LANES;
+                    let cost = V::Wide::load(costs.add(place)).add(change[half]);
+                    cost.store(costs.add(place));
+                    // The 32768 that costs are less by falls out at the top.
+                    least = least.min(cost.times_16().add(V::Wide::splat((2 * block + half) as i16)));
+                }
+            }
+            let key = least.least();
+            let place = (key & 15) as usize * V::Wide::LANES + least.first_equal(V::Wide::splat(key));
+            let best = (key >> 4).wrapping_add(i16::MIN);
+            let above = search.above(best);
+            let bound = V::Wide::splat(above);
+            let mut near = V::Wide::splat(0);
+            for half in 0..2 * BLOCKS {
+                near = near.add(bound.greater(V::Wide::load(costs.add(half * V::Wide::LANES))));
+            }
+            // There is room on both sides.
+            let beside = [*costs.add(place).sub(1), best, *costs.add(place + 1)];
+            let near = V::Wide::splat(0).sub(near).sum() as u16;
+            found.put(x - search.range.start, place, beside, near, above);
+        }
     }
 }

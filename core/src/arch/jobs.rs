@@ -47,6 +47,8 @@ pub(crate) struct Search {
     pub(crate) right_first: usize,
     pub(crate) right_end: usize,
     pub(crate) uniqueness_percent: u16,
+    /// Whether no cost is above 2040 and no sum of a column above 127.
+    pub(crate) is_small: bool,
 }
 
 /// For each right pixel the best left partner: two tables, right pixel `x` at `lead + x`.

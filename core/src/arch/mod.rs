@@ -17,7 +17,7 @@ mod plain;
 #[expect(unsafe_code, reason = "instructions that not every processor has, used where it has them")]
 mod x86_64;
 
-pub(crate) use decide::{Decide, Sums, evidence, refine};
+pub(crate) use decide::{Decide, NO_PARTNER, Sums, evidence, refine};
 pub(crate) use jobs::{CHUNK, CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
 
 use crate::disparity::DisparityPixel;
@@ -198,5 +198,17 @@ pub(crate) fn decide(
         #[cfg(target_arch = "x86_64")]
         Backend::Avx2 => x86_64::decide(chosen, decide, search, found, sums, out, weak),
         _ => decide.run(search, found, sums, out, weak),
+    }
+}
+
+/// Takes out pixels whose right partner matches another left pixel better; see [`decide::back_check`].
+///
+/// # Bound
+/// A fixed number of steps for each pixel.
+pub(crate) fn back_check(chosen: Chosen, tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[u16]) {
+    match chosen.0 {
+        #[cfg(target_arch = "x86_64")]
+        Backend::Avx2 => x86_64::back_check(chosen, tolerance, first, out, right),
+        _ => decide::back_check(tolerance, first, out, right),
     }
 }

@@ -1,10 +1,7 @@
 //! For each pixel of the right row the best partner in the left one.
 
 use super::plan::Plan;
-use crate::arch::Right;
-
-/// Where nothing was offered: farther from any disparity than a check back allows.
-pub(super) const NO_PARTNER: u16 = i16::MAX as u16;
+use crate::arch::{NO_PARTNER, Right};
 
 /// Two tables for the backends; see [`Right`].
 ///

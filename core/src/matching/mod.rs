@@ -22,7 +22,7 @@ use crate::{
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
 };
-use best::{NO_PARTNER, RightBest};
+use best::RightBest;
 use columns::Columns;
 use plan::Plan;
 use rows::Rows;
@@ -232,6 +232,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             right_first: usize::from(right.start) + margin,
             right_end: usize::from(right.end).min(self.width).saturating_sub(margin),
             uniqueness_percent,
+            is_small: settings.window_height * 8 <= 127 && area * 8 <= 2040,
         };
         if window == Window::Narrow {
             self.right.begin();
@@ -298,16 +299,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
 
     /// Takes out pixels whose right partner matches another left pixel better.
     fn back_check(&mut self, out: &mut [DisparityPixel], first: usize) {
-        let tolerance = self.settings.back_check_px;
         let right = self.right.disparities(&self.plan);
-        for (x, pixel) in (first..).zip(out) {
-            // Rounding to the nearest pixel may be one off the place that was chosen: half a pixel is shared.
-            let disparity = (pixel.steps() + 8) >> 4;
-            let back = right.get(x.wrapping_sub(usize::from(disparity))).copied().unwrap_or(NO_PARTNER);
-            let leads_back = back.abs_diff(disparity) <= tolerance;
-            *pixel =
-                if pixel.has_value() & !leads_back { DisparityPixel::none(Reason::LeftRightMismatch) } else { *pixel };
-        }
+        arch::back_check(self.plan.chosen, self.settings.back_check_px, first, out, right);
     }
 }
 

@@ -77,6 +77,15 @@ impl Vector for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn widen_signed(self) -> [Words16; 2] {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        unsafe {
+            let halves = [_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0)];
+            [Words16(_mm256_cvtepi8_epi16(halves[0])), Words16(_mm256_cvtepi8_epi16(halves[1]))]
+        }
+    }
+
+    #[inline(always)]
     unsafe fn widen_shifted(self) -> [Words16; 2] {
         // SAFETY: the caller guarantees the instructions and what lies behind pointers.
         unsafe {
@@ -158,6 +167,19 @@ impl Wide for Words16 {
             let turned = _mm_xor_si128(half, _mm_set1_epi16(i16::MIN));
             (_mm_cvtsi128_si32(_mm_minpos_epu16(turned)) as i16) ^ i16::MIN
         }
+    }
+
+    #[inline(always)]
+    unsafe fn first_equal(self, other: Self) -> usize {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        let equal = unsafe { _mm256_movemask_epi8(_mm256_cmpeq_epi16(self.0, other.0)) };
+        equal.trailing_zeros() as usize / 2
+    }
+
+    #[inline(always)]
+    unsafe fn times_16(self) -> Self {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        unsafe { Self(_mm256_slli_epi16::<4>(self.0)) }
     }
 
     #[inline(always)]

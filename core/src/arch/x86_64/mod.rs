@@ -7,7 +7,7 @@ mod sse41;
 use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
 use super::{
-    Backend, Chosen, Decide, Sums, generic,
+    Backend, Chosen, Decide, Sums, decide as plain_decide, generic,
     jobs::{Found, KeyLimits, Right, Search, SlideCodes},
 };
 use crate::disparity::DisparityPixel;
@@ -167,5 +167,18 @@ pub(super) fn decide(
         // SAFETY: as in `slide_codes`.
         Backend::Avx2 => unsafe { with_avx2(decide, search, found, sums, out, weak) },
         _ => decide.run(search, found, sums, out, weak),
+    }
+}
+
+/// Checks back, with the plain version made into vectors by the compiler.
+pub(super) fn back_check(chosen: Chosen, tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[u16]) {
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    fn with_avx2(tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[u16]) {
+        plain_decide::back_check(tolerance, first, out, right);
+    }
+    match chosen.backend() {
+        // SAFETY: as in `slide_codes`.
+        Backend::Avx2 => unsafe { with_avx2(tolerance, first, out, right) },
+        _ => plain_decide::back_check(tolerance, first, out, right),
     }
 }

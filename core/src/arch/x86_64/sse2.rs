@@ -76,6 +76,17 @@ impl Vector for Sse2 {
 
     /// A byte in the upper half is 256 times the number.
     #[inline(always)]
+    unsafe fn widen_signed(self) -> [Words; 2] {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        unsafe {
+            let zero = _mm_setzero_si128();
+            let [low, high] = [_mm_unpacklo_epi8(zero, self.0), _mm_unpackhi_epi8(zero, self.0)];
+            [Words(_mm_srai_epi16::<8>(low)), Words(_mm_srai_epi16::<8>(high))]
+        }
+    }
+
+    /// A byte in the upper half is 256 times the number.
+    #[inline(always)]
     unsafe fn widen_shifted(self) -> [Words; 2] {
         // SAFETY: the caller guarantees the instructions and what lies behind pointers.
         unsafe {
@@ -157,6 +168,19 @@ impl Wide for Words {
             let two = _mm_min_epi16(four, _mm_shuffle_epi32::<1>(four));
             _mm_cvtsi128_si32(_mm_min_epi16(two, _mm_srli_epi32::<16>(two))) as i16
         }
+    }
+
+    #[inline(always)]
+    unsafe fn first_equal(self, other: Self) -> usize {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        let equal = unsafe { _mm_movemask_epi8(_mm_cmpeq_epi16(self.0, other.0)) };
+        equal.trailing_zeros() as usize / 2
+    }
+
+    #[inline(always)]
+    unsafe fn times_16(self) -> Self {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        unsafe { Self(_mm_slli_epi16::<4>(self.0)) }
     }
 
     #[inline(always)]

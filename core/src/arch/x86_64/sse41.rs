@@ -85,6 +85,15 @@ impl Vector for Sse41 {
         }
     }
 
+    #[inline(always)]
+    unsafe fn widen_signed(self) -> [Words41; 2] {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        unsafe {
+            let high = _mm_unpackhi_epi64(self.0, self.0);
+            [Words41(Words(_mm_cvtepi8_epi16(self.0))), Words41(Words(_mm_cvtepi8_epi16(high)))]
+        }
+    }
+
     /// A byte in the upper half is 256 times the number.
     #[inline(always)]
     unsafe fn widen_shifted(self) -> [Words41; 2] {
@@ -168,6 +177,18 @@ impl Wide for Words41 {
             let turned = _mm_xor_si128(self.0.0, _mm_set1_epi16(i16::MIN));
             (_mm_cvtsi128_si32(_mm_minpos_epu16(turned)) as i16) ^ i16::MIN
         }
+    }
+
+    #[inline(always)]
+    unsafe fn first_equal(self, other: Self) -> usize {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        unsafe { self.0.first_equal(other.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn times_16(self) -> Self {
+        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        unsafe { Self(self.0.times_16()) }
     }
 
     #[inline(always)]
