@@ -25,13 +25,18 @@ impl Sums {
     ///
     /// # Bound
     /// A step for each pixel, and for each column of the first window.
+    #[inline(always)]
     pub(crate) fn make(&mut self, search: &Search, columns: &[u32]) {
         let before = search.range.start.saturating_sub(search.radius + 1);
         let leaving = columns.get(before..).unwrap_or_default();
         let entering = columns.get(search.range.start + search.radius..).unwrap_or_default();
         let mut sum = leaving.iter().take(2 * search.radius + 1).fold(0u32, |sum, &column| sum.wrapping_add(column));
+        // What changes first, many at a time, so that only one addition waits for the one before.
         for ((out, &enter), &leave) in self.0.iter_mut().zip(entering).zip(leaving) {
-            sum = sum.wrapping_add(enter).wrapping_sub(leave);
+            *out = enter.wrapping_sub(leave);
+        }
+        for out in &mut self.0 {
+            sum = sum.wrapping_add(*out);
             *out = sum;
         }
     }

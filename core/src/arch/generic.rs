@@ -321,6 +321,9 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
                 let place = first + half * V::Wide::LANES;
                 let key = V::Wide::load(keys.add(place)).add(change[half]);
                 key.store(keys.add(place));
+                if BORDER && is_outside::<V>(place, &candidates) {
+                    continue;
+                }
                 let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
                 least = least.min(key);
                 V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
@@ -335,6 +338,9 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
         let bound = V::Wide::splat(above);
         let mut near = V::Wide::splat(0);
         for place in (0..stride).step_by(V::Wide::LANES) {
+            if BORDER && is_outside::<V>(place, &candidates) {
+                continue;
+            }
             let key = V::Wide::load(keys.add(place));
             let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
             near = near.add(bound.greater(key));
@@ -411,6 +417,12 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
     }
 }
 
+/// Whether a vector from `place` on has no candidates.
+#[inline(always)]
+fn is_outside<V: Vector>(place: usize, candidates: &core::ops::Range<usize>) -> bool {
+    place + V::Wide::LANES <= candidates.start || place >= candidates.end
+}
+
 /// # Safety
 /// That of [`search_keys`].
 #[inline(always)]
@@ -421,6 +433,9 @@ unsafe fn outside_is_nothing<V: Vector>(
 ) -> V::Wide {
     // SAFETY: that of this function.
     unsafe {
+        if place >= candidates.start && place + V::Wide::LANES <= candidates.end {
+            return number;
+        }
         let nothing = V::Wide::splat(i16::MAX);
         let places = V::Wide::load(PLACES.as_ptr()).add(V::Wide::splat(place as i16));
         let from = places.greater(V::Wide::splat(candidates.start as i16 - 1));
@@ -520,6 +535,9 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
                 let place = first + half * V::Wide::LANES;
                 let cost = V::Wide::load(costs.add(place)).add(enter[half].sub(leave[half]));
                 cost.store(costs.add(place));
+                if BORDER && is_outside::<V>(place, &candidates) {
+                    continue;
+                }
                 let cost = if BORDER { outside_is_nothing::<V>(cost, place, &candidates) } else { cost };
                 least = least.min(cost);
                 if let Some([best, disparities]) = tables {
@@ -542,6 +560,9 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
         // The first of equal places: those that are not equal are 32767 or so.
         let mut first = nothing;
         for place in (0..stride).step_by(V::Wide::LANES) {
+            if BORDER && is_outside::<V>(place, &candidates) {
+                continue;
+            }
             let cost = V::Wide::load(costs.add(place));
             let cost = if BORDER { outside_is_nothing::<V>(cost, place, &candidates) } else { cost };
             near = near.add(bound.greater(cost));

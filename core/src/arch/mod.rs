@@ -17,10 +17,8 @@ mod plain;
 #[expect(unsafe_code, reason = "instructions that not every processor has, used where it has them")]
 mod x86_64;
 
-pub(crate) use decide::{Decide, NO_PARTNER, Sums, evidence, refine};
+pub(crate) use decide::{Decide, NO_PARTNER, Sums, back_check, evidence, refine};
 pub(crate) use jobs::{CHUNK, CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
-
-use crate::disparity::DisparityPixel;
 
 /// Whose instructions the inner loops are made of. All of them give the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -181,34 +179,14 @@ pub(crate) fn search_words(
     plain::search_costs(search, columns, work, right, found);
 }
 
-/// Decides on the pixels that were searched for; see [`Decide::run`].
-///
-/// # Bound
-/// A fixed number of steps for each pixel.
-pub(crate) fn decide(
-    chosen: Chosen,
-    decide: &Decide,
-    search: &Search,
-    found: &Found,
-    sums: &Sums,
-    out: &mut [DisparityPixel],
-    weak: &mut [bool],
-) {
-    match chosen.0 {
-        #[cfg(target_arch = "x86_64")]
-        Backend::Avx2 => x86_64::decide(chosen, decide, search, found, sums, out, weak),
-        _ => decide.run(search, found, sums, out, weak),
-    }
-}
-
-/// Takes out pixels whose right partner matches another left pixel better; see [`decide::back_check`].
-///
-/// # Bound
-/// A fixed number of steps for each pixel.
-pub(crate) fn back_check(chosen: Chosen, tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[u16]) {
-    match chosen.0 {
-        #[cfg(target_arch = "x86_64")]
-        Backend::Avx2 => x86_64::back_check(chosen, tolerance, first, out, right),
-        _ => decide::back_check(tolerance, first, out, right),
+/// Runs steps in plain Rust that are compiled for the chosen backend: functions in them are to be `inline(always)`.
+#[inline(always)]
+pub(crate) fn compiled<R>(chosen: Chosen, steps: impl FnOnce() -> R) -> R {
+    #[cfg(target_arch = "x86_64")]
+    return x86_64::compiled(chosen, steps);
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        let _ = chosen;
+        steps()
     }
 }

@@ -31,6 +31,7 @@ impl<const WIDTH: usize> RightBest<WIDTH> {
     ///
     /// # Bound
     /// One step for each pixel.
+    #[inline(always)]
     pub(super) fn disparities(&mut self, plan: &Plan) -> &[u16] {
         let (first, second) = self.tables.as_flattened_mut().split_at_mut(WIDTH + WIDTH / 2);
         let (first, second) =

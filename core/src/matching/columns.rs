@@ -44,6 +44,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Columns<WIDTH, DISPARITIES> {
     ///
     /// # Bound
     /// `width` steps.
+    #[inline(always)]
     pub(super) fn slide_evidence(&mut self, enter: &[u8], leave: Option<&[u8]>) {
         let of = |byte: u8| evidence(byte & !SATURATED_FLAG, byte & SATURATED_FLAG != 0);
         for (sum, &enter) in self.evidence.iter_mut().zip(enter) {

@@ -136,7 +136,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             return;
         }
         let split = self.plan.chosen.backend().splits_codes();
-        self.rows.push(left, right, left_span, right_span, &self.settings, split);
+        let (rows, settings) = (&mut self.rows, &self.settings);
+        arch::compiled(self.plan.chosen, || rows.push(left, right, left_span, right_span, settings, split));
         self.absorb();
     }
 
@@ -148,7 +149,9 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         // Rows above the first filtered one never entered.
         let leaving = newest.checked_sub(window).filter(|&y| y >= first);
         let Self { rows, columns, width, plan, .. } = self;
-        columns.slide_evidence(rows.evidence(newest, *width), leaving.map(|y| rows.evidence(y, *width)));
+        arch::compiled(plan.chosen, || {
+            columns.slide_evidence(rows.evidence(newest, *width), leaving.map(|y| rows.evidence(y, *width)));
+        });
         let range = [usize::from(self.settings.disparities), usize::from(self.settings.min_disparity)];
         match self.settings.cost {
             MatchCost::Census => {
@@ -249,10 +252,13 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             search.range = run.start..run.end.min(run.start + CHUNK);
             run.start = search.range.end;
             self.search(&search, window);
-            self.sums.make(&search, self.columns.evidence());
             let chunk = search.range.clone();
             let (Some(out), Some(weak)) = (out.get_mut(chunk.clone()), self.weak.get_mut(chunk)) else { break };
-            arch::decide(self.plan.chosen, &decide, &search, &self.found, &self.sums, out, weak);
+            let (sums, columns, found) = (&mut self.sums, &self.columns, &self.found);
+            arch::compiled(self.plan.chosen, || {
+                sums.make(&search, columns.evidence());
+                decide.run(&search, found, sums, out, weak);
+            });
         }
         if settings.back_check && window == Window::Narrow {
             self.back_check(&mut out[first..end], first);
@@ -270,7 +276,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
                 (end, gap) = (i + 1, 0);
             } else {
                 gap += 1;
-                if gap > radius {
+                if gap > radius / 3 {
                     break;
                 }
             }
@@ -299,8 +305,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
 
     /// Takes out pixels whose right partner matches another left pixel better.
     fn back_check(&mut self, out: &mut [DisparityPixel], first: usize) {
-        let right = self.right.disparities(&self.plan);
-        arch::back_check(self.plan.chosen, self.settings.back_check_px, first, out, right);
+        let (right, plan, tolerance) = (&mut self.right, &self.plan, self.settings.back_check_px);
+        arch::compiled(plan.chosen, || arch::back_check(tolerance, first, out, right.disparities(plan)));
     }
 }
 

@@ -107,6 +107,7 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         self.pushed.checked_sub(self.reach + 1).filter(|&y| y >= self.reach)
     }
 
+    #[inline(always)]
     pub(super) fn push(
         &mut self,
         left: &[u8],
@@ -141,12 +142,13 @@ impl<const WIDTH: usize> Rows<WIDTH> {
                 (*low, *high) = (*low & 0x0f, *low >> 4);
             }
         }
-        let filtered = &kept_left[..width];
-        let before = core::iter::once(&kept_left[0]).chain(filtered);
-        let responses =
-            filtered.iter().zip(before).map(|(&here, &before)| prefilter::response(settings.prefilter, here, before));
-        for ((out, response), grey) in evidence[..width].iter_mut().zip(responses).zip(&grey_left[y % GREY]) {
-            *out = response | if SATURATED.contains(grey) { SATURATED_FLAG } else { 0 };
+        let (filtered, grey) = (&kept_left[..width], &grey_left[y % GREY][..width]);
+        // The first pixel has none before it: it stands for it itself.
+        let mut before = filtered.first().copied().unwrap_or_default();
+        for (out, (&here, &grey)) in evidence[..width].iter_mut().zip(filtered.iter().zip(grey)) {
+            let saturated = (grey == SATURATED[0]) | (grey == SATURATED[1]);
+            *out = prefilter::response(settings.prefilter, here, before) | if saturated { SATURATED_FLAG } else { 0 };
+            before = here;
         }
         self.kept_spans[y % KEPT] = (y - *reach..=y + *reach).map(|y| grey_spans[y % GREY]).fold(EVERYTHING, both);
     }

@@ -7,10 +7,9 @@ mod sse41;
 use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
 use super::{
-    Backend, Chosen, Decide, Sums, decide as plain_decide, generic,
+    Backend, Chosen, generic,
     jobs::{Found, KeyLimits, Right, Search, SlideCodes},
 };
-use crate::disparity::DisparityPixel;
 use avx2::Avx2;
 use sse2::Sse2;
 use sse41::Sse41;
@@ -142,43 +141,16 @@ pub(super) fn search_costs(
     }
 }
 
-/// Decides, with the plain version made into vectors by the compiler.
-pub(super) fn decide(
-    chosen: Chosen,
-    decide: &Decide,
-    search: &Search,
-    found: &Found,
-    sums: &Sums,
-    out: &mut [DisparityPixel],
-    weak: &mut [bool],
-) {
+/// Runs what is inlined into it with the instructions that were chosen: plain Rust, of which the compiler makes vectors.
+#[inline(always)]
+pub(super) fn compiled<R>(chosen: Chosen, steps: impl FnOnce() -> R) -> R {
     #[target_feature(enable = "avx2,bmi1,bmi2")]
-    fn with_avx2(
-        decide: &Decide,
-        search: &Search,
-        found: &Found,
-        sums: &Sums,
-        out: &mut [DisparityPixel],
-        weak: &mut [bool],
-    ) {
-        decide.run(search, found, sums, out, weak);
+    fn with_avx2<R>(steps: impl FnOnce() -> R) -> R {
+        steps()
     }
     match chosen.backend() {
         // SAFETY: as in `slide_codes`.
-        Backend::Avx2 => unsafe { with_avx2(decide, search, found, sums, out, weak) },
-        _ => decide.run(search, found, sums, out, weak),
-    }
-}
-
-/// Checks back, with the plain version made into vectors by the compiler.
-pub(super) fn back_check(chosen: Chosen, tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[u16]) {
-    #[target_feature(enable = "avx2,bmi1,bmi2")]
-    fn with_avx2(tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[u16]) {
-        plain_decide::back_check(tolerance, first, out, right);
-    }
-    match chosen.backend() {
-        // SAFETY: as in `slide_codes`.
-        Backend::Avx2 => unsafe { with_avx2(tolerance, first, out, right) },
-        _ => plain_decide::back_check(tolerance, first, out, right),
+        Backend::Avx2 => unsafe { with_avx2(steps) },
+        _ => steps(),
     }
 }
