@@ -120,7 +120,7 @@ impl Decide {
 }
 
 /// A right pixel that nothing was offered to: farther from any disparity than a check back allows.
-pub(crate) const NO_PARTNER: u16 = i16::MAX as u16;
+pub(crate) const NO_PARTNER: i16 = i16::MAX;
 
 /// Takes out pixels whose right partner matches another left pixel better. `out` begins at pixel `first`; `right` says for each
 /// right pixel at which disparity it matches best.
@@ -128,10 +128,10 @@ pub(crate) const NO_PARTNER: u16 = i16::MAX as u16;
 /// # Bound
 /// A fixed number of steps for each pixel.
 #[inline(always)]
-pub(crate) fn back_check(tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[u16]) {
+pub(crate) fn back_check(tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[i16]) {
     let mismatch = DisparityPixel::none(Reason::LeftRightMismatch).bits();
     for (start, out) in (first..).step_by(CHUNK).zip(out.chunks_mut(CHUNK)) {
-        let (mut disparities, mut back) = ([0u16; CHUNK], [0u16; CHUNK]);
+        let (mut disparities, mut back) = ([0u16; CHUNK], [0i16; CHUNK]);
         for (disparity, pixel) in disparities.iter_mut().zip(&*out) {
             // Rounding to the nearest pixel may be one off the place that was chosen: half a pixel is shared.
             *disparity = ((pixel.bits() & 0x7fff) + 8) >> 4;
@@ -141,7 +141,7 @@ pub(crate) fn back_check(tolerance: u16, first: usize, out: &mut [DisparityPixel
             *back = right.get(x.wrapping_sub(usize::from(disparity))).copied().unwrap_or(NO_PARTNER);
         }
         for (pixel, (&disparity, &back)) in out.iter_mut().zip(disparities.iter().zip(&back)) {
-            let away = back.max(disparity) - back.min(disparity);
+            let away = disparity.abs_diff(back as u16);
             let refused = pixel.has_value() & (away > tolerance);
             *pixel = DisparityPixel::from_bits(if refused { mismatch } else { pixel.bits() });
         }

@@ -10,12 +10,11 @@ use crate::arch::{NO_PARTNER, Right};
 pub(super) struct RightBest<const WIDTH: usize> {
     /// Room for two tables of half as many pixels more than the width: what a backend may touch beyond the row.
     tables: [[i16; 3]; WIDTH],
-    disparities: [u16; WIDTH],
 }
 
 impl<const WIDTH: usize> RightBest<WIDTH> {
     pub(super) const fn new() -> Self {
-        Self { tables: [[0; 3]; WIDTH], disparities: [0; WIDTH] }
+        Self { tables: [[0; 3]; WIDTH] }
     }
 
     pub(super) fn begin(&mut self) {
@@ -27,27 +26,21 @@ impl<const WIDTH: usize> RightBest<WIDTH> {
         Right { tables: [first, second], lead }
     }
 
-    /// Disparity of the cheapest partner of each right pixel, or [`NO_PARTNER`].
+    /// Disparity of the cheapest partner of each right pixel, or [`NO_PARTNER`]. The tables are used up by that.
     ///
     /// # Bound
     /// One step for each pixel.
     #[inline(always)]
-    pub(super) fn disparities(&mut self, plan: &Plan) -> &[u16] {
-        let (first, second) = self.tables.as_flattened_mut().split_at_mut(WIDTH + WIDTH / 2);
-        let (first, second) =
-            (first.get_mut(plan.lead..).unwrap_or_default(), second.get(plan.lead..).unwrap_or_default());
+    pub(super) fn disparities(&mut self, plan: &Plan) -> &[i16] {
+        let [first, second] = self.lend(plan.lead).tables;
         if plan.keys {
-            for ((disparity, first), &second) in self.disparities.iter_mut().zip(&*first).zip(second) {
-                let key = second.min(*first);
+            for (second, &first) in second.iter_mut().zip(&*first) {
+                let key = first.min(*second);
                 // No cost is 511.
                 let told = (key as u16 & 0x7f).wrapping_add(plan.key_disparity);
-                *disparity = if key < 0x7f80 { told } else { NO_PARTNER };
-            }
-        } else {
-            for (disparity, &told) in self.disparities.iter_mut().zip(second) {
-                *disparity = told as u16;
+                *second = if key < 0x7f80 { told as i16 } else { NO_PARTNER };
             }
         }
-        &self.disparities
+        second.get(plan.lead..).unwrap_or_default()
     }
 }

@@ -1,13 +1,13 @@
 //! Sums over the height of the window, for each column and disparity.
 
-use super::rows::SATURATED_FLAG;
-use crate::arch::{self, Chosen, CodeRow, SlideCodes, evidence};
+use super::rows::Evidence;
+use crate::arch::{self, Chosen, CodeRow, SlideCodes};
 
 /// For each column of the left picture, the sums over the rows under the window: differences for each disparity
 /// (largest disparity first, so that the right pixels lie in the order of memory), texture, saturated pixels.
 pub(super) struct Columns<const WIDTH: usize, const DISPARITIES: usize> {
     costs: Costs<WIDTH, DISPARITIES>,
-    /// Texture and saturated pixels; see [`evidence`].
+    /// Texture and saturated pixels; see [`arch::evidence`].
     evidence: [u32; WIDTH],
 }
 
@@ -45,13 +45,10 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Columns<WIDTH, DISPARITIES> {
     /// # Bound
     /// `width` steps.
     #[inline(always)]
-    pub(super) fn slide_evidence(&mut self, enter: &[u8], leave: Option<&[u8]>) {
-        let of = |byte: u8| evidence(byte & !SATURATED_FLAG, byte & SATURATED_FLAG != 0);
-        for (sum, &enter) in self.evidence.iter_mut().zip(enter) {
-            *sum = sum.wrapping_add(of(enter));
-        }
-        for (sum, &leave) in self.evidence.iter_mut().zip(leave.unwrap_or_default()) {
-            *sum = sum.wrapping_sub(of(leave));
+    pub(super) fn slide_evidence(&mut self, enter: Evidence<'_>, leave: Option<Evidence<'_>>) {
+        enter.add_to(&mut self.evidence, u32::wrapping_add);
+        if let Some(leave) = leave {
+            leave.add_to(&mut self.evidence, u32::wrapping_sub);
         }
     }
 

@@ -150,7 +150,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         let leaving = newest.checked_sub(window).filter(|&y| y >= first);
         let Self { rows, columns, width, plan, .. } = self;
         arch::compiled(plan.chosen, || {
-            columns.slide_evidence(rows.evidence(newest, *width), leaving.map(|y| rows.evidence(y, *width)));
+            let evidence = |y| rows.evidence(y, *width, self.settings.prefilter);
+            columns.slide_evidence(evidence(newest), leaving.map(evidence));
         });
         let range = [usize::from(self.settings.disparities), usize::from(self.settings.min_disparity)];
         match self.settings.cost {

@@ -1,7 +1,7 @@
 //! The rows under the window, as they come in.
 
-use super::{MatchCost, MatchSettings, census, prefilter};
-use crate::arch::CodeRow;
+use super::{MatchCost, MatchSettings, Prefilter, census, prefilter};
+use crate::arch::{self, CodeRow};
 
 /// Filtered rows that are kept: the window, and the one that leaves it.
 pub(super) const KEPT: usize = MatchSettings::MAX_WINDOW as usize + 1;
@@ -46,20 +46,40 @@ enum Kind {
     LeftCodes = 1,
     /// Census codes, or their lower four bits where the backend splits them.
     RightCodes = 2,
-    /// Upper four bits of the codes, where the backend splits them.
+    /// Upper four bits of the right codes, where the backend splits them, and [`SATURATED_FLAG`] of the left picture.
     RightHigh = 3,
     Right = 4,
-    /// Response of the left filter, at most 127, and [`SATURATED_FLAG`].
-    Evidence = 5,
 }
 
-const KINDS: usize = 6;
+const KINDS: usize = 5;
 
 /// Bytes in front of a row of right codes that can be read, in rows: those of the kinds before it.
 pub(super) const LEAD_ROWS: usize = Kind::RightCodes as usize;
 
-/// Set in the evidence where the left grey value is saturated.
-pub(super) const SATURATED_FLAG: u8 = 0x80;
+/// Set where the left grey value is saturated, in a bit that looking four bits up passes over.
+pub(super) const SATURATED_FLAG: u8 = 0x10;
+
+/// What says how much a row of the left picture can be relied on.
+#[derive(Clone, Copy)]
+pub(super) struct Evidence<'a> {
+    filtered: &'a [u8],
+    flags: &'a [u8],
+    prefilter: Prefilter,
+}
+
+impl Evidence<'_> {
+    /// Adds [`arch::evidence`] of every pixel to the sum of its column, or takes it away.
+    #[inline(always)]
+    pub(super) fn add_to(self, sums: &mut [u32], add: impl Fn(u32, u32) -> u32) {
+        // The first pixel has none before it: it stands for it itself.
+        let mut before = self.filtered.first().copied().unwrap_or_default();
+        for (sum, (&here, &flags)) in sums.iter_mut().zip(self.filtered.iter().zip(self.flags)) {
+            let response = prefilter::response(self.prefilter, here, before);
+            *sum = add(*sum, arch::evidence(response, flags & SATURATED_FLAG != 0));
+            before = here;
+        }
+    }
+}
 
 /// Rings of grey and filtered rows. A filtered row is complete when the grey rows below that it needs have come.
 pub(super) struct Rows<const WIDTH: usize> {
@@ -125,9 +145,9 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         self.pushed += 1;
         let Some(y) = self.newest_filtered() else { return };
         let Self { grey_left, grey_right, grey_spans, kept, reach, .. } = self;
-        let [kept_left, left_codes, right_codes, right_high, kept_right, evidence] = &mut kept[y % KEPT];
+        let [kept_left, left_codes, right_codes, right_high, kept_right] = &mut kept[y % KEPT];
         for (grey, filtered, codes) in
-            [(&*grey_left, &mut *kept_left, left_codes), (&*grey_right, kept_right, &mut *right_codes)]
+            [(&*grey_left, kept_left, left_codes), (&*grey_right, kept_right, &mut *right_codes)]
         {
             // The ring holds rows y - 3 to y + 3; those that a filter does not reach may be missing.
             let rows: [&[u8]; GREY] = core::array::from_fn(|i| &grey[(y + GREY + i - census::REACH) % GREY][..width]);
@@ -137,18 +157,12 @@ impl<const WIDTH: usize> Rows<WIDTH> {
                 census::codes(rows, &mut codes[..width]);
             }
         }
-        if split_codes {
-            for (low, high) in right_codes[..width].iter_mut().zip(right_high) {
-                (*low, *high) = (*low & 0x0f, *low >> 4);
-            }
-        }
-        let (filtered, grey) = (&kept_left[..width], &grey_left[y % GREY][..width]);
-        // The first pixel has none before it: it stands for it itself.
-        let mut before = filtered.first().copied().unwrap_or_default();
-        for (out, (&here, &grey)) in evidence[..width].iter_mut().zip(filtered.iter().zip(grey)) {
+        let grey = &grey_left[y % GREY][..width];
+        for ((low, high), &grey) in right_codes[..width].iter_mut().zip(right_high).zip(grey) {
             let saturated = (grey == SATURATED[0]) | (grey == SATURATED[1]);
-            *out = prefilter::response(settings.prefilter, here, before) | if saturated { SATURATED_FLAG } else { 0 };
-            before = here;
+            let upper = if split_codes { *low >> 4 } else { 0 };
+            *high = upper | if saturated { SATURATED_FLAG } else { 0 };
+            *low &= if split_codes { 0x0f } else { 0xff };
         }
         self.kept_spans[y % KEPT] = (y - *reach..=y + *reach).map(|y| grey_spans[y % GREY]).fold(EVERYTHING, both);
     }
@@ -158,9 +172,9 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         (self.kind(y, Kind::Left, width), self.kind(y, Kind::Right, width))
     }
 
-    /// Response of the left filter along row `y`, and [`SATURATED_FLAG`].
-    pub(super) fn evidence(&self, y: usize, width: usize) -> &[u8] {
-        self.kind(y, Kind::Evidence, width)
+    /// What row `y` adds to the sums of evidence.
+    pub(super) fn evidence(&self, y: usize, width: usize, prefilter: Prefilter) -> Evidence<'_> {
+        Evidence { filtered: self.kind(y, Kind::Left, width), flags: self.kind(y, Kind::RightHigh, width), prefilter }
     }
 
     /// Census codes of row `y`.
