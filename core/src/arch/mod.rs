@@ -9,6 +9,7 @@
 
 mod decide;
 #[cfg(target_arch = "x86_64")]
+#[expect(clippy::needless_range_loop, reason = "loops of a fixed number of rounds, by number, are what is unrolled")]
 #[expect(unsafe_code, reason = "vectors are loaded and stored through pointers, within bounds that are checked before")]
 mod generic;
 mod jobs;
@@ -179,14 +180,20 @@ pub(crate) fn search_words(
     plain::search_costs(search, columns, work, right, found);
 }
 
-/// Runs steps in plain Rust that are compiled for the chosen backend: functions in them are to be `inline(always)`.
+/// Steps in plain Rust that are compiled for the chosen backend. `run`, and what it calls, is to be `inline(always)`: that is why
+/// this is not a closure.
+pub(crate) trait Steps {
+    fn run(self);
+}
+
+/// Runs steps with the instructions of the chosen backend.
 #[inline(always)]
-pub(crate) fn compiled<R>(chosen: Chosen, steps: impl FnOnce() -> R) -> R {
+pub(crate) fn compiled(chosen: Chosen, steps: impl Steps) {
     #[cfg(target_arch = "x86_64")]
-    return x86_64::compiled(chosen, steps);
+    x86_64::compiled(chosen, steps);
     #[cfg(not(target_arch = "x86_64"))]
     {
         let _ = chosen;
-        steps()
+        steps.run();
     }
 }

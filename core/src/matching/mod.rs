@@ -10,6 +10,7 @@ mod plan;
 mod prefilter;
 mod rows;
 mod settings;
+mod steps;
 mod strip;
 
 pub(crate) use crate::arch::refine;
@@ -26,6 +27,7 @@ use best::RightBest;
 use columns::Columns;
 use plan::Plan;
 use rows::Rows;
+use steps::{CheckBack, DecidePixels, PushRow, SlideEvidence};
 
 /// The matcher for pictures up to `WIDTH` wide and up to `DISPARITIES` disparities.
 ///
@@ -135,9 +137,14 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if left.len() != self.width || right.len() != self.width || self.rows.pushed() >= self.height {
             return;
         }
-        let split = self.plan.chosen.backend().splits_codes();
-        let (rows, settings) = (&mut self.rows, &self.settings);
-        arch::compiled(self.plan.chosen, || rows.push(left, right, left_span, right_span, settings, split));
+        let steps = PushRow {
+            rows: &mut self.rows,
+            pictures: [left, right],
+            spans: [left_span, right_span],
+            settings: &self.settings,
+            split_codes: self.plan.chosen.backend().splits_codes(),
+        };
+        arch::compiled(self.plan.chosen, steps);
         self.absorb();
     }
 
@@ -149,10 +156,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         // Rows above the first filtered one never entered.
         let leaving = newest.checked_sub(window).filter(|&y| y >= first);
         let Self { rows, columns, width, plan, .. } = self;
-        arch::compiled(plan.chosen, || {
-            let evidence = |y| rows.evidence(y, *width, self.settings.prefilter);
-            columns.slide_evidence(evidence(newest), leaving.map(evidence));
-        });
+        let evidence = |y| rows.evidence(y, *width, self.settings.prefilter);
+        arch::compiled(plan.chosen, SlideEvidence { columns, enter: evidence(newest), leave: leaving.map(evidence) });
         let range = [usize::from(self.settings.disparities), usize::from(self.settings.min_disparity)];
         match self.settings.cost {
             MatchCost::Census => {
@@ -255,14 +260,21 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             self.search(&search, window);
             let chunk = search.range.clone();
             let (Some(out), Some(weak)) = (out.get_mut(chunk.clone()), self.weak.get_mut(chunk)) else { break };
-            let (sums, columns, found) = (&mut self.sums, &self.columns, &self.found);
-            arch::compiled(self.plan.chosen, || {
-                sums.make(&search, columns.evidence());
-                decide.run(&search, found, sums, out, weak);
-            });
+            let steps = DecidePixels {
+                decide: &decide,
+                search: &search,
+                found: &self.found,
+                evidence: self.columns.evidence(),
+                sums: &mut self.sums,
+                out,
+                weak,
+            };
+            arch::compiled(self.plan.chosen, steps);
         }
         if settings.back_check && window == Window::Narrow {
-            self.back_check(&mut out[first..end], first);
+            let (right, plan, tolerance) = (&mut self.right, &self.plan, settings.back_check_px);
+            let Some(out) = out.get_mut(first..end) else { return };
+            arch::compiled(plan.chosen, CheckBack { right, plan, tolerance, first, out });
         }
     }
 
@@ -302,12 +314,6 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
                 arch::search_words(search, columns.words(), work, (window == Window::Narrow).then_some(lent), found);
             }
         }
-    }
-
-    /// Takes out pixels whose right partner matches another left pixel better.
-    fn back_check(&mut self, out: &mut [DisparityPixel], first: usize) {
-        let (right, plan, tolerance) = (&mut self.right, &self.plan, self.settings.back_check_px);
-        arch::compiled(plan.chosen, || arch::back_check(tolerance, first, out, right.disparities(plan)));
     }
 }
 

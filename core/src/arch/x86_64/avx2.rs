@@ -49,10 +49,13 @@ impl Vector for Avx2 {
 
     #[inline(always)]
     unsafe fn code(code: u8) -> [__m256i; 2] {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        let [low, high] = [&DIFFERENT[usize::from(code & 15)], &DIFFERENT[usize::from(code >> 4)]];
+        // SAFETY: both rows have 16 bytes; the caller guarantees the instructions.
         unsafe {
-            [code & 15, code >> 4]
-                .map(|four| _mm256_broadcastsi128_si256(_mm_loadu_si128(DIFFERENT[usize::from(four)].as_ptr().cast())))
+            [
+                _mm256_broadcastsi128_si256(_mm_loadu_si128(low.as_ptr().cast())),
+                _mm256_broadcastsi128_si256(_mm_loadu_si128(high.as_ptr().cast())),
+            ]
         }
     }
 
@@ -72,7 +75,7 @@ impl Vector for Avx2 {
         // SAFETY: the caller guarantees the instructions and what lies behind pointers.
         unsafe {
             let halves = [_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0)];
-            halves.map(|half| Words16(_mm256_cvtepu8_epi16(half)))
+            [Words16(_mm256_cvtepu8_epi16(halves[0])), Words16(_mm256_cvtepu8_epi16(halves[1]))]
         }
     }
 
@@ -90,7 +93,10 @@ impl Vector for Avx2 {
         // SAFETY: the caller guarantees the instructions and what lies behind pointers.
         unsafe {
             let halves = [_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0)];
-            halves.map(|half| Words16(_mm256_slli_epi16::<7>(_mm256_cvtepi8_epi16(half))))
+            [
+                Words16(_mm256_slli_epi16::<7>(_mm256_cvtepi8_epi16(halves[0]))),
+                Words16(_mm256_slli_epi16::<7>(_mm256_cvtepi8_epi16(halves[1]))),
+            ]
         }
     }
 }

@@ -7,7 +7,7 @@ mod sse41;
 use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
 use super::{
-    Backend, Chosen, generic,
+    Backend, Chosen, Steps, generic,
     jobs::{Found, KeyLimits, Right, Search, SlideCodes},
 };
 use avx2::Avx2;
@@ -141,16 +141,16 @@ pub(super) fn search_costs(
     }
 }
 
-/// Runs what is inlined into it with the instructions that were chosen: plain Rust, of which the compiler makes vectors.
+/// Runs steps with the instructions that were chosen: plain Rust, of which the compiler makes vectors.
 #[inline(always)]
-pub(super) fn compiled<R>(chosen: Chosen, steps: impl FnOnce() -> R) -> R {
+pub(super) fn compiled(chosen: Chosen, steps: impl Steps) {
     #[target_feature(enable = "avx2,bmi1,bmi2")]
-    fn with_avx2<R>(steps: impl FnOnce() -> R) -> R {
-        steps()
+    fn with_avx2(steps: impl Steps) {
+        steps.run();
     }
     match chosen.backend() {
         // SAFETY: as in `slide_codes`.
         Backend::Avx2 => unsafe { with_avx2(steps) },
-        _ => steps(),
+        _ => steps.run(),
     }
 }
