@@ -15,6 +15,7 @@ pub(crate) struct CodeRow<'a> {
     /// Right codes, or their lower four bits where the backend splits them; pixel `x` at `lead + x`.
     pub(crate) low: &'a [u8],
     /// Upper four bits, where the backend splits codes; pixel `x` at `lead + x`.
+    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "no backend here splits codes"))]
     pub(crate) high: &'a [u8],
     /// Bytes in front of the first pixel that may be read and mean nothing.
     pub(crate) lead: usize,
@@ -48,6 +49,7 @@ pub(crate) struct Search {
     pub(crate) right_end: usize,
     pub(crate) uniqueness_percent: u16,
     /// Whether no cost is above 2040 and no sum of a column above 127.
+    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "plain Rust has one way for all costs"))]
     pub(crate) is_small: bool,
 }
 

@@ -6,6 +6,20 @@
 //!
 //! On x86-64 the processor is asked when a matcher is configured ([`Backend::fastest`]); elsewhere the compiler's target says
 //! it. No call goes through a pointer: each step is a `match` on the backend, once for a row or for 64 pixels.
+//!
+//! # What it costs
+//! Instructions for 32 disparities of a pixel with AVX2, as compiled:
+//!
+//! | step | loads | arithmetic | stores | limited by |
+//! | --- | --- | --- | --- | --- |
+//! | a row into and out of the column sums | 5 | 7: four table look-ups, three sums | 1 | loads: half of the unaligned ones lie in two lines of the cache |
+//! | sums under the window, as keys | 2 | 8 | 2 | arithmetic |
+//! | best left partner of each right pixel | 2 | 4 | 2 | stores: one vector in a cycle |
+//! | least key, and the others that are nearly as good | 0 | 6 | 0 | arithmetic |
+//!
+//! Beside that some 40 instructions for each pixel: the least of a vector, its neighbours, what is found. SSE2 takes twice as many
+//! vectors, and 25 instead of 7 to count bits without look-up. To decide takes some 60 instructions for eight pixels. The
+//! wide window is asked for weak pixels only, and made afresh at each run of them.
 
 mod decide;
 #[cfg(target_arch = "x86_64")]
