@@ -17,6 +17,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod arch;
 pub mod detector;
 pub mod disparity;
 pub mod error;

@@ -10,6 +10,7 @@ pub use memory::{Capacities, memory_bytes};
 pub use stage::{Probe, Stage};
 
 use crate::{
+    arch::Backend,
     disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
     geometry::{Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
@@ -149,6 +150,17 @@ impl<
         self.debounce = Debounce::new(settings.health.trigger_frames, settings.health.release_frames);
         self.setup = Some(setup);
         Ok(())
+    }
+
+    /// Chooses whose instructions the matcher uses from the next [`Self::configure`] on; without this those of the fastest
+    /// backend that the processor has. Says whether it has them; if not, nothing changes. No result depends on it.
+    pub fn set_backend(&mut self, backend: Backend) -> bool {
+        self.matcher.set_backend(backend)
+    }
+
+    /// The backend that the matcher uses; see [`Matcher::backend`].
+    pub const fn backend(&self) -> Backend {
+        self.matcher.backend()
     }
 
     /// Forgets all that was seen in earlier frames, as [`Self::configure`] does, and keeps what is configured.

@@ -14,6 +14,7 @@ pub(super) const ROWS: usize = 2 * REACH + 1;
 ///
 /// # Bound
 /// Eight comparisons for each pixel.
+#[inline(always)]
 pub(super) fn codes(rows: [&[u8]; ROWS], out: &mut [u8]) {
     let width = rows.iter().fold(out.len(), |width, row| width.min(row.len()));
     out.fill(0);

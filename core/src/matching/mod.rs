@@ -6,23 +6,28 @@
 mod best;
 mod census;
 mod columns;
+mod plan;
 mod prefilter;
 mod rows;
 mod settings;
+mod steps;
 mod strip;
 
-pub(crate) use best::refine;
+pub(crate) use crate::arch::refine;
 pub use rows::ValidSpan;
 pub use settings::{MatchCost, MatchSettings, Prefilter};
 pub(crate) use strip::Strip;
 
 use crate::{
+    arch::{self, Backend, CHUNK, Decide, Found, KeyLimits, Search, Sums},
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
 };
-use best::{Best, RightBest};
+use best::RightBest;
 use columns::Columns;
+use plan::Plan;
 use rows::Rows;
+use steps::{CheckBack, DecidePixels, PushRow, SlideEvidence};
 
 /// The matcher for pictures up to `WIDTH` wide and up to `DISPARITIES` disparities.
 ///
@@ -34,6 +39,10 @@ use rows::Rows;
 /// `width` for the rest.
 pub struct Matcher<const WIDTH: usize, const DISPARITIES: usize> {
     settings: MatchSettings,
+    /// The backend that was asked for; the fastest one if none was.
+    backend: Backend,
+    is_forced: bool,
+    plan: Plan,
     width: usize,
     height: usize,
     rows: Rows<WIDTH>,
@@ -41,15 +50,11 @@ pub struct Matcher<const WIDTH: usize, const DISPARITIES: usize> {
     right: RightBest<WIDTH>,
     /// Pixels of the row that the narrow window could not tell for want of texture.
     weak: [bool; WIDTH],
-    /// Sums under the window at the current pixel, largest disparity first.
-    costs: [u16; DISPARITIES],
-}
-
-/// Candidates for one pixel: places in the table of costs whose window lies within the right picture.
-#[derive(Clone, Copy)]
-struct Candidates {
-    first: usize,
-    end: usize,
+    /// Sums under the window at the current pixel, largest disparity first, with room around them.
+    work: [[i16; 4]; DISPARITIES],
+    key_limits: KeyLimits,
+    found: Found,
+    sums: Sums,
 }
 
 impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
@@ -57,14 +62,36 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     pub const fn new() -> Self {
         Self {
             settings: MatchSettings::UNSET,
+            backend: Backend::Plain,
+            is_forced: false,
+            plan: Plan::UNSET,
             width: 0,
             height: 0,
             rows: Rows::new(),
             columns: Columns::new(),
             right: RightBest::new(),
             weak: [false; WIDTH],
-            costs: [0; DISPARITIES],
+            work: [[0; 4]; DISPARITIES],
+            key_limits: KeyLimits::new(),
+            found: Found::new(),
+            sums: Sums::new(),
         }
+    }
+
+    /// Chooses whose instructions are used from the next [`Self::configure`] on: without this, those of the fastest backend.
+    /// Says whether the processor has them; if not, nothing changes. The results are the same with all of them.
+    pub fn set_backend(&mut self, backend: Backend) -> bool {
+        let available = backend.is_available();
+        if available {
+            (self.backend, self.is_forced) = (backend, true);
+        }
+        available
+    }
+
+    /// The backend in use: slower than the one that was asked for where tables have no room for its vectors, and plain Rust for
+    /// absolute differences.
+    pub const fn backend(&self) -> Backend {
+        self.plan.chosen.backend()
     }
 
     /// Takes settings and the size of the rectified pictures.
@@ -83,6 +110,9 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         capacity("matching.disparities", usize::from(settings.disparities), DISPARITIES)?;
         capacity("calibration.width", width, WIDTH)?;
         self.settings = *settings;
+        let backend = if self.is_forced { self.backend } else { Backend::fastest() };
+        self.plan = Plan::new::<WIDTH, DISPARITIES>(backend, settings, width);
+        self.key_limits.fill(settings.uniqueness_percent);
         self.width = width;
         self.height = height;
         self.begin();
@@ -107,7 +137,14 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if left.len() != self.width || right.len() != self.width || self.rows.pushed() >= self.height {
             return;
         }
-        self.rows.push(left, right, left_span, right_span, &self.settings);
+        let steps = PushRow {
+            rows: &mut self.rows,
+            pictures: [left, right],
+            spans: [left_span, right_span],
+            settings: &self.settings,
+            split_codes: self.plan.chosen.backend().splits_codes(),
+        };
+        arch::compiled(self.plan.chosen, steps);
         self.absorb();
     }
 
@@ -116,11 +153,21 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         let window = usize::from(self.settings.window_height);
         let first = self.rows.first_filtered();
         let Some(newest) = self.rows.newest_filtered() else { return };
-        let enter = self.rows.filtered(newest, self.width);
         // Rows above the first filtered one never entered.
-        let leave = newest.checked_sub(window).filter(|&y| y >= first).map(|y| self.rows.filtered(y, self.width));
-        let disparities = usize::from(self.settings.disparities);
-        self.columns.slide(self.settings.cost, enter, leave, disparities, usize::from(self.settings.min_disparity));
+        let leaving = newest.checked_sub(window).filter(|&y| y >= first);
+        let Self { rows, columns, width, plan, .. } = self;
+        let evidence = |y| rows.evidence(y, *width, self.settings.prefilter);
+        arch::compiled(plan.chosen, SlideEvidence { columns, enter: evidence(newest), leave: leaving.map(evidence) });
+        let range = [usize::from(self.settings.disparities), usize::from(self.settings.min_disparity)];
+        match self.settings.cost {
+            MatchCost::Census => {
+                let (enter, leave) = (rows.codes(newest, *width), leaving.map(|y| rows.codes(y, *width)));
+                columns.slide_codes(plan.chosen, plan.stride, range, enter, leave);
+            }
+            MatchCost::AbsoluteDifferences => {
+                columns.slide_grey(range, rows.filtered(newest, *width), leaving.map(|y| rows.filtered(y, *width)));
+            }
+        }
     }
 
     /// Writes disparity row `next` to `out` if all that it needs has come; says whether it did. Rows are to be taken in order,
@@ -168,8 +215,6 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         };
         let radius = usize::from(width) / 2;
         let margin = radius + settings.reach();
-        let disparities = usize::from(settings.disparities);
-        let min_disparity = usize::from(settings.min_disparity);
         // Columns that the window and what is compared may touch, and their middle pixels.
         let (left, right) = self.rows.spans(y, usize::from(settings.window_height) / 2 + 1);
         let first = usize::from(left.start) + margin;
@@ -177,83 +222,107 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if first >= end {
             return;
         }
-        let right_first = usize::from(right.start) + margin;
-        let right_end = usize::from(right.end).min(self.width).saturating_sub(margin);
-        self.right.begin(self.width);
-        let costs = &mut self.costs[..disparities];
-        costs.fill(0);
-        let (mut texture, mut saturated) = (0u32, 0u32);
-        for x in first - radius..first + radius {
-            add(costs, self.columns.costs(x, disparities));
-            texture += u32::from(self.columns.texture(x));
-            saturated += u32::from(self.columns.saturated(x));
-        }
         let area = u32::from(width) * u32::from(settings.window_height);
-        let min_texture = (u32::from(settings.texture) * area) >> 4;
-        let weak_texture = (u32::from(settings.weak_texture) * area) >> 4;
-        let max_saturated = area * u32::from(settings.saturated_percent) / 100;
-        for x in first..end {
-            let enter = x + radius;
-            let leave = x.wrapping_sub(radius + 1);
-            if x == first {
-                add(costs, self.columns.costs(enter, disparities));
-            } else {
-                slide(costs, self.columns.costs(enter, disparities), self.columns.costs(leave, disparities));
-                texture -= u32::from(self.columns.texture(leave));
-                saturated -= u32::from(self.columns.saturated(leave));
+        let decide = Decide {
+            min_texture: (u32::from(settings.texture) * area) >> 4,
+            weak_texture: (u32::from(settings.weak_texture) * area) >> 4,
+            max_saturated: area * u32::from(settings.saturated_percent) / 100,
+            unique: uniqueness_percent > 0,
+            only_weak: window == Window::Wide,
+            keys: window == Window::Narrow && self.plan.keys,
+        };
+        let mut search = Search {
+            range: first..first,
+            follows: false,
+            radius,
+            stride: self.plan.stride,
+            disparities: usize::from(settings.disparities),
+            min_disparity: usize::from(settings.min_disparity),
+            right_first: usize::from(right.start) + margin,
+            right_end: usize::from(right.end).min(self.width).saturating_sub(margin),
+            uniqueness_percent,
+            is_small: settings.window_height * 8 <= 127 && area * 8 <= 2040,
+        };
+        if window == Window::Narrow {
+            self.right.begin();
+        }
+        let mut run = first..if window == Window::Narrow { end } else { first };
+        loop {
+            if run.is_empty() && window == Window::Wide {
+                run = self.weak_run(run.end..end, radius);
             }
-            texture += u32::from(self.columns.texture(enter));
-            saturated += u32::from(self.columns.saturated(enter));
-
-            // Place e in the table is disparity min + (disparities - 1 - e); its right pixel is x - disparity.
-            let (Some(out), Some(weak)) = (out.get_mut(x), self.weak.get_mut(x)) else { break };
-            let Some(reach) = x.checked_sub(right_first) else { continue };
-            let largest = (min_disparity + disparities - 1).min(reach);
-            let smallest = min_disparity.max((x + 1).saturating_sub(right_end));
-            if largest < smallest || right_first >= right_end {
-                continue;
+            if run.is_empty() {
+                break;
             }
-            let place = |disparity: usize| min_disparity + disparities - 1 - disparity;
-            let candidates = Candidates { first: place(largest), end: place(smallest) + 1 };
-            if window == Window::Narrow {
-                self.right.offer(&costs[candidates.first..candidates.end], x - largest, largest as u16);
-            } else if !*weak {
-                continue;
-            }
-            *out = if saturated > max_saturated {
-                DisparityPixel::none(Reason::Saturated)
-            } else if texture < min_texture {
-                DisparityPixel::none(Reason::LowTexture)
-            } else {
-                choose(costs, candidates, min_disparity + disparities - 1, uniqueness_percent)
+            search.follows = search.range.end == run.start && !search.range.is_empty();
+            search.range = run.start..run.end.min(run.start + CHUNK);
+            run.start = search.range.end;
+            self.search(&search, window);
+            let chunk = search.range.clone();
+            let (Some(out), Some(weak)) = (out.get_mut(chunk.clone()), self.weak.get_mut(chunk)) else { break };
+            let steps = DecidePixels {
+                decide: &decide,
+                search: &search,
+                found: &self.found,
+                evidence: self.columns.evidence(),
+                sums: &mut self.sums,
+                out,
+                weak,
             };
-            let told_apart = !matches!(out.get(), Err(Reason::LowTexture | Reason::NotUnique));
-            *weak = match window {
-                Window::Narrow => texture < weak_texture && !told_apart,
-                Window::Wide => true,
-            };
+            arch::compiled(self.plan.chosen, steps);
         }
         if settings.back_check && window == Window::Narrow {
-            self.back_check(&mut out[first..end], first, window);
+            let (right, plan, tolerance) = (&mut self.right, &self.plan, settings.back_check_px);
+            let Some(out) = out.get_mut(first..end) else { return };
+            arch::compiled(plan.chosen, CheckBack { right, plan, tolerance, first, out });
         }
     }
 
-    /// Takes out pixels that were matched with `window` and whose right partner matches another left pixel better.
-    fn back_check(&self, out: &mut [DisparityPixel], first: usize, window: Window) {
-        let tolerance = i32::from(self.settings.back_check_px);
-        let weak = self.weak.get(first..).unwrap_or_default();
-        for (i, (pixel, &weak)) in out.iter_mut().zip(weak).enumerate() {
-            if !pixel.has_value() || weak != (window == Window::Wide) {
-                continue;
+    /// The next run of weak pixels in `range`; gaps that are shorter than it takes to start anew are part of it. Empty if there is
+    /// none.
+    fn weak_run(&self, range: core::ops::Range<usize>, radius: usize) -> core::ops::Range<usize> {
+        let weak = self.weak.get(range.clone()).unwrap_or_default();
+        let Some(skipped) = first_weak(weak) else { return range.end..range.end };
+        let (mut end, mut gap) = (skipped, 0);
+        for (i, &weak) in weak.iter().enumerate().skip(skipped) {
+            if weak {
+                (end, gap) = (i + 1, 0);
+            } else {
+                gap += 1;
+                if gap > radius / 3 {
+                    break;
+                }
             }
-            let disparity = usize::from((pixel.steps() + 8) >> 4);
-            let back = (first + i).checked_sub(disparity).and_then(|x| self.right.disparity(x));
-            // Rounding to the nearest pixel may be one off the place that was chosen: half a pixel is shared.
-            if back.is_none_or(|back| (i32::from(back) - disparity as i32).abs() > tolerance) {
-                *pixel = DisparityPixel::none(Reason::LeftRightMismatch);
+        }
+        range.start + skipped..range.start + end
+    }
+
+    /// Finds the best places of a chunk, in the way of the plan.
+    fn search(&mut self, search: &Search, window: Window) {
+        let Self { plan, columns, right, found, .. } = self;
+        let work = self.work.as_flattened_mut();
+        let lent = right.lend(plan.lead);
+        match (self.settings.cost, window) {
+            (MatchCost::Census, Window::Narrow) if plan.keys => {
+                arch::search_keys(plan.chosen, search, &self.key_limits, columns.bytes(), work, lent, found);
+            }
+            (MatchCost::Census, _) => {
+                let right = (window == Window::Narrow).then_some(lent);
+                arch::search_bytes(plan.chosen, search, columns.bytes(), work, right, found);
+            }
+            (MatchCost::AbsoluteDifferences, _) => {
+                arch::search_words(search, columns.words(), work, (window == Window::Narrow).then_some(lent), found);
             }
         }
     }
+}
+
+/// The first weak pixel; most blocks have none.
+fn first_weak(weak: &[bool]) -> Option<usize> {
+    const BLOCK: usize = 32;
+    let some = |block: &[bool]| block.iter().fold(false, |some, &weak| some | weak);
+    let (block, pixels) = weak.chunks(BLOCK).enumerate().find(|(_, block)| some(block))?;
+    Some(block * BLOCK + pixels.iter().position(|&weak| weak)?)
 }
 
 /// Which of the two windows a row is matched with.
@@ -266,40 +335,6 @@ enum Window {
 impl<const WIDTH: usize, const DISPARITIES: usize> Default for Matcher<WIDTH, DISPARITIES> {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-/// The best candidate, refined to 1/16 px, or why there is none. `top` is the disparity at place 0.
-fn choose(costs: &[u16], candidates: Candidates, top: usize, uniqueness_percent: u16) -> DisparityPixel {
-    let best = Best::find(&costs[candidates.first..candidates.end]);
-    let place = candidates.first + best.place;
-    // At an end of the range the true minimum may lie beyond, and there is no neighbour to interpolate with.
-    if place == candidates.first || place + 1 >= candidates.end {
-        return DisparityPixel::none(Reason::OutOfRange);
-    }
-    if uniqueness_percent > 0 {
-        let second = u32::from(best.second(&costs[candidates.first..candidates.end]));
-        if second * 100 <= u32::from(best.cost) * (100 + u32::from(uniqueness_percent)) {
-            return DisparityPixel::none(Reason::NotUnique);
-        }
-    }
-    let farther = i32::from(costs[place + 1]);
-    let nearer = i32::from(costs[place - 1]);
-    let steps = ((top - place) as i32) * 16 + best::refine(farther, i32::from(best.cost), nearer);
-    DisparityPixel::from_steps(steps.max(0) as u16)
-}
-
-/// `costs += enter`, wrapping: the settings see to it that sums fit 16 bits.
-fn add(costs: &mut [u16], enter: &[u16]) {
-    for (cost, &enter) in costs.iter_mut().zip(enter) {
-        *cost = cost.wrapping_add(enter);
-    }
-}
-
-/// `costs += enter - leave`.
-fn slide(costs: &mut [u16], enter: &[u16], leave: &[u16]) {
-    for ((cost, &enter), &leave) in costs.iter_mut().zip(enter).zip(leave) {
-        *cost = cost.wrapping_add(enter).wrapping_sub(leave);
     }
 }
 

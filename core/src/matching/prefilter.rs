@@ -9,6 +9,7 @@ pub(super) const CAP: i32 = 31;
 ///
 /// The horizontal Sobel response is an eighth of the weighted sum, cut off at +-[`CAP`] and lifted by it; grey values are
 /// halved so that the sum over a window of 21 x 21 fits 16 bits. The first and last pixel have no response.
+#[inline(always)]
 pub(super) fn filter(kind: Prefilter, above: &[u8], middle: &[u8], below: &[u8], out: &mut [u8]) {
     match kind {
         Prefilter::Grey => {
@@ -20,6 +21,7 @@ pub(super) fn filter(kind: Prefilter, above: &[u8], middle: &[u8], below: &[u8],
     }
 }
 
+#[inline(always)]
 fn sobel(above: &[u8], middle: &[u8], below: &[u8], out: &mut [u8]) {
     let n = out.len().min(above.len()).min(middle.len()).min(below.len());
     if n < 3 {
@@ -38,6 +40,7 @@ fn sobel(above: &[u8], middle: &[u8], below: &[u8], out: &mut [u8]) {
 }
 
 /// How much a filtered pixel says about where it lies along the row.
+#[inline(always)]
 pub(super) fn response(kind: Prefilter, filtered: u8, before: u8) -> u8 {
     match kind {
         Prefilter::HorizontalSobel => filtered.abs_diff(CAP as u8),

@@ -1,6 +1,7 @@
 //! The rows under the window, as they come in.
 
-use super::{MatchCost, MatchSettings, census, prefilter};
+use super::{MatchCost, MatchSettings, Prefilter, census, prefilter};
+use crate::arch::{self, CodeRow};
 
 /// Filtered rows that are kept: the window, and the one that leaves it.
 pub(super) const KEPT: usize = MatchSettings::MAX_WINDOW as usize + 1;
@@ -37,41 +38,47 @@ impl From<core::ops::Range<usize>> for ValidSpan {
     }
 }
 
-/// One filtered row of the pair.
+/// What is kept of a filtered row: one row of bytes for each kind.
 #[derive(Clone, Copy)]
-pub(super) struct FilteredRow<'a> {
-    pub(super) left: &'a [u8],
-    pub(super) right: &'a [u8],
-    /// Response of the left filter: texture.
-    pub(super) texture: &'a [u8],
-    /// 1 where the left grey value is saturated.
-    pub(super) saturated: &'a [u8],
-    /// Census codes; all 0 where absolute differences are compared.
-    pub(super) left_codes: &'a [u8],
-    pub(super) right_codes: &'a [u8],
+#[repr(usize)]
+enum Kind {
+    Left = 0,
+    LeftCodes = 1,
+    /// Census codes, or their lower four bits where the backend splits them.
+    RightCodes = 2,
+    /// Upper four bits of the right codes, where the backend splits them, and [`SATURATED_FLAG`] of the left picture.
+    RightHigh = 3,
+    Right = 4,
 }
 
-impl<'a> FilteredRow<'a> {
-    /// What absolute differences are taken of, left and right.
-    pub(super) const fn grey(self) -> (&'a [u8], &'a [u8]) {
-        (self.left, self.right)
-    }
+const KINDS: usize = 5;
 
-    /// What Hamming distances are taken of, left and right.
-    pub(super) const fn codes(self) -> (&'a [u8], &'a [u8]) {
-        (self.left_codes, self.right_codes)
-    }
+/// Bytes in front of a row of right codes that can be read, in rows: those of the kinds before it.
+pub(super) const LEAD_ROWS: usize = Kind::RightCodes as usize;
+
+/// Set where the left grey value is saturated, in a bit that looking four bits up passes over.
+pub(super) const SATURATED_FLAG: u8 = 0x10;
+
+/// What says how much a row of the left picture can be relied on.
+#[derive(Clone, Copy)]
+pub(super) struct Evidence<'a> {
+    filtered: &'a [u8],
+    flags: &'a [u8],
+    prefilter: Prefilter,
 }
 
-#[derive(Clone, Copy)]
-struct Kept<const WIDTH: usize> {
-    left: [u8; WIDTH],
-    right: [u8; WIDTH],
-    texture: [u8; WIDTH],
-    saturated: [u8; WIDTH],
-    left_codes: [u8; WIDTH],
-    right_codes: [u8; WIDTH],
-    spans: (ValidSpan, ValidSpan),
+impl Evidence<'_> {
+    /// Adds [`arch::evidence`] of every pixel to the sum of its column, or takes it away.
+    #[inline(always)]
+    pub(super) fn add_to(self, sums: &mut [u32], add: impl Fn(u32, u32) -> u32) {
+        // The first pixel has none before it: it stands for it itself.
+        let mut before = self.filtered.first().copied().unwrap_or_default();
+        for (sum, (&here, &flags)) in sums.iter_mut().zip(self.filtered.iter().zip(self.flags)) {
+            let response = prefilter::response(self.prefilter, here, before);
+            *sum = add(*sum, arch::evidence(response, flags & SATURATED_FLAG != 0));
+            before = here;
+        }
+    }
 }
 
 /// Rings of grey and filtered rows. A filtered row is complete when the grey rows below that it needs have come.
@@ -79,7 +86,8 @@ pub(super) struct Rows<const WIDTH: usize> {
     grey_left: [[u8; WIDTH]; GREY],
     grey_right: [[u8; WIDTH]; GREY],
     grey_spans: [(ValidSpan, ValidSpan); GREY],
-    kept: [Kept<WIDTH>; KEPT],
+    kept: [[[u8; WIDTH]; KINDS]; KEPT],
+    kept_spans: [(ValidSpan, ValidSpan); KEPT],
     pushed: usize,
     /// Rows above and below that a filtered row is made from.
     reach: usize,
@@ -91,15 +99,8 @@ impl<const WIDTH: usize> Rows<WIDTH> {
             grey_left: [[0; WIDTH]; GREY],
             grey_right: [[0; WIDTH]; GREY],
             grey_spans: [(ValidSpan::EMPTY, ValidSpan::EMPTY); GREY],
-            kept: [Kept {
-                left: [0; WIDTH],
-                right: [0; WIDTH],
-                texture: [0; WIDTH],
-                saturated: [0; WIDTH],
-                left_codes: [0; WIDTH],
-                right_codes: [0; WIDTH],
-                spans: (ValidSpan::EMPTY, ValidSpan::EMPTY),
-            }; KEPT],
+            kept: [[[0; WIDTH]; KINDS]; KEPT],
+            kept_spans: [(ValidSpan::EMPTY, ValidSpan::EMPTY); KEPT],
             pushed: 0,
             reach: 0,
         }
@@ -126,6 +127,7 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         self.pushed.checked_sub(self.reach + 1).filter(|&y| y >= self.reach)
     }
 
+    #[inline(always)]
     pub(super) fn push(
         &mut self,
         left: &[u8],
@@ -133,6 +135,7 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         left_span: ValidSpan,
         right_span: ValidSpan,
         settings: &MatchSettings,
+        split_codes: bool,
     ) {
         let slot = self.pushed % GREY;
         let width = left.len();
@@ -142,46 +145,58 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         self.pushed += 1;
         let Some(y) = self.newest_filtered() else { return };
         let Self { grey_left, grey_right, grey_spans, kept, reach, .. } = self;
-        let kept = &mut kept[y % KEPT];
-        for (grey, filtered, codes) in [
-            (&*grey_left, &mut kept.left[..width], &mut kept.left_codes[..width]),
-            (&*grey_right, &mut kept.right[..width], &mut kept.right_codes[..width]),
-        ] {
+        let [kept_left, left_codes, right_codes, right_high, kept_right] = &mut kept[y % KEPT];
+        for (grey, filtered, codes) in
+            [(&*grey_left, kept_left, left_codes), (&*grey_right, kept_right, &mut *right_codes)]
+        {
             // The ring holds rows y - 3 to y + 3; those that a filter does not reach may be missing.
             let rows: [&[u8]; GREY] = core::array::from_fn(|i| &grey[(y + GREY + i - census::REACH) % GREY][..width]);
             let [_, _, above, middle, below, _, _] = rows;
-            prefilter::filter(settings.prefilter, above, middle, below, filtered);
+            prefilter::filter(settings.prefilter, above, middle, below, &mut filtered[..width]);
             if settings.cost == MatchCost::Census {
-                census::codes(rows, codes);
+                census::codes(rows, &mut codes[..width]);
             }
         }
-        for (out, grey) in kept.saturated[..width].iter_mut().zip(&grey_left[y % GREY][..width]) {
-            *out = u8::from(SATURATED.contains(grey));
+        let grey = &grey_left[y % GREY][..width];
+        for ((low, high), &grey) in right_codes[..width].iter_mut().zip(right_high).zip(grey) {
+            let saturated = (grey == SATURATED[0]) | (grey == SATURATED[1]);
+            let upper = if split_codes { *low >> 4 } else { 0 };
+            *high = upper | if saturated { SATURATED_FLAG } else { 0 };
+            *low &= if split_codes { 0x0f } else { 0xff };
         }
-        let before = core::iter::once(&kept.left[0]).chain(&kept.left[..width]);
-        for ((out, &filtered), &before) in kept.texture[..width].iter_mut().zip(&kept.left[..width]).zip(before) {
-            *out = prefilter::response(settings.prefilter, filtered, before);
-        }
-        kept.spans = (y - *reach..=y + *reach).map(|y| grey_spans[y % GREY]).fold(EVERYTHING, both);
+        self.kept_spans[y % KEPT] = (y - *reach..=y + *reach).map(|y| grey_spans[y % GREY]).fold(EVERYTHING, both);
     }
 
-    /// Filtered row `y`, which must be among the last [`KEPT`].
-    pub(super) fn filtered(&self, y: usize, width: usize) -> FilteredRow<'_> {
-        let kept = &self.kept[y % KEPT];
-        FilteredRow {
-            left: &kept.left[..width],
-            right: &kept.right[..width],
-            texture: &kept.texture[..width],
-            saturated: &kept.saturated[..width],
-            left_codes: &kept.left_codes[..width],
-            right_codes: &kept.right_codes[..width],
+    /// Grey values after the filter, of row `y`, which must be among the last [`KEPT`]; left and right.
+    pub(super) fn filtered(&self, y: usize, width: usize) -> (&[u8], &[u8]) {
+        (self.kind(y, Kind::Left, width), self.kind(y, Kind::Right, width))
+    }
+
+    /// What row `y` adds to the sums of evidence.
+    pub(super) fn evidence(&self, y: usize, width: usize, prefilter: Prefilter) -> Evidence<'_> {
+        Evidence { filtered: self.kind(y, Kind::Left, width), flags: self.kind(y, Kind::RightHigh, width), prefilter }
+    }
+
+    /// Census codes of row `y`.
+    pub(super) fn codes(&self, y: usize, width: usize) -> CodeRow<'_> {
+        let all = self.kept.as_flattened().as_flattened();
+        let from = |kind: Kind| all.get(((y % KEPT) * KINDS + kind as usize - LEAD_ROWS) * WIDTH..).unwrap_or_default();
+        CodeRow {
+            left: self.kind(y, Kind::LeftCodes, width),
+            low: from(Kind::RightCodes),
+            high: from(Kind::RightHigh),
+            lead: LEAD_ROWS * WIDTH,
         }
+    }
+
+    fn kind(&self, y: usize, kind: Kind, width: usize) -> &[u8] {
+        &self.kept[y % KEPT][kind as usize][..width]
     }
 
     /// Columns that are valid in all filtered rows within `radius - 1` of row `y`, left and right.
     pub(super) fn spans(&self, y: usize, radius: usize) -> (ValidSpan, ValidSpan) {
         let first = (y + 1).saturating_sub(radius);
-        (first..y + radius).map(|y| self.kept[y % KEPT].spans).fold(EVERYTHING, both)
+        (first..y + radius).map(|y| self.kept_spans[y % KEPT]).fold(EVERYTHING, both)
     }
 }
 

@@ -26,13 +26,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if newest + 1 < first + ROWS || newest >= first + KEPT {
             return None;
         }
-        let row = |i: usize| self.rows.filtered(first + i, self.width);
+        let rows: [_; ROWS] = core::array::from_fn(|i| self.rows.filtered(first + i, self.width));
         let (left_span, right_span) = self.rows.spans(y, ROWS / 2 + 1);
-        Some(Strip {
-            left: core::array::from_fn(|i| row(i).left),
-            right: core::array::from_fn(|i| row(i).right),
-            left_span,
-            right_span,
-        })
+        Some(Strip { left: rows.map(|(left, _)| left), right: rows.map(|(_, right)| right), left_span, right_span })
     }
 }

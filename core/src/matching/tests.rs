@@ -5,6 +5,8 @@ use std::{boxed::Box, collections::BTreeMap, ops::Range, vec, vec::Vec};
 use super::*;
 use crate::test_random::Random;
 
+mod backends;
+
 const WIDTH: usize = 112;
 const DISPARITIES: usize = 32;
 

@@ -85,7 +85,8 @@ impl<const NODES: usize> Grid<NODES> {
             if *upper == NOWHERE || *lower == NOWHERE {
                 return None;
             }
-            Some([0, 1].map(|i| i32::from(upper[i]) * (STEP as i32 - below) + i32::from(lower[i]) * below))
+            let between = |i: usize| i32::from(upper[i]) * (STEP as i32 - below) + i32::from(lower[i]) * below;
+            Some([between(0), between(1)])
         };
         let mut nodes = upper.iter().zip(lower).take(self.columns).map(node);
         let mut left = nodes.next().flatten();
@@ -93,11 +94,17 @@ impl<const NODES: usize> Grid<NODES> {
         let mut base: [i32; 2] =
             core::array::from_fn(|i| plane.origin[i].wrapping_add(plane.along_column[i].wrapping_mul(v as i32)));
         nodes.map(move |right| {
-            let segment = left.zip(right).map(|(left, right)| Segment {
-                start: [0, 1].map(|i| base[i].wrapping_add(left[i] << STEP_SHIFT)),
-                slope: [0, 1].map(|i| plane.along_row[i].wrapping_add(right[i] - left[i])),
-            });
-            base = [0, 1].map(|i| base[i].wrapping_add(plane.along_row[i] << STEP_SHIFT));
+            let segment = match (left, right) {
+                (Some(left), Some(right)) => {
+                    let start = |i: usize| base[i].wrapping_add(left[i] << STEP_SHIFT);
+                    let slope = |i: usize| plane.along_row[i].wrapping_add(right[i] - left[i]);
+                    Some(Segment { start: [start(0), start(1)], slope: [slope(0), slope(1)] })
+                }
+                _ => None,
+            };
+            for (base, along) in base.iter_mut().zip(plane.along_row) {
+                *base = base.wrapping_add(along << STEP_SHIFT);
+            }
             left = right;
             segment
         })

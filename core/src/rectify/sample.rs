@@ -39,7 +39,7 @@ pub(super) fn sample_row(
             runs.start = begin;
             continue;
         };
-        let mut place = segment.start.map(|p| p.wrapping_add(HALF_WEIGHT));
+        let mut place = step(segment.start, [HALF_WEIGHT; 2]);
         let whole = match <&mut [u8; STEP]>::try_from(&mut *chunk) {
             Ok(chunk) => source.fill_inside(place, segment.slope, chunk),
             Err(_) => false,
@@ -112,15 +112,19 @@ impl<'a> Source<'a> {
     /// it to [`Self::at`]. Gives the same bits.
     ///
     /// With the neighbours in a tile of fixed size, nothing has to be checked per pixel and all eight are blended at once.
+    #[inline]
     fn fill_inside(&self, start: [i32; 2], slope: [i32; 2], out: &mut [u8; STEP]) -> bool {
         // A segment is straight: its ends tell.
-        let end: [i32; 2] = core::array::from_fn(|i| start[i].wrapping_add(slope[i].wrapping_mul(STEP as i32 - 1)));
-        let [low, high] = [[0, 1].map(|i| start[i].min(end[i])), [0, 1].map(|i| start[i].max(end[i]))];
-        if low[0] < 0 || low[1] < 0 || (0..2).any(|i| high[i] >= self.last[i] << PLACE_SHIFT) {
+        let last = STEP as i32 - 1;
+        let end =
+            [start[0].wrapping_add(slope[0].wrapping_mul(last)), start[1].wrapping_add(slope[1].wrapping_mul(last))];
+        let (low, high) = ([start[0].min(end[0]), start[1].min(end[1])], [start[0].max(end[0]), start[1].max(end[1])]);
+        let inside = |i: usize| low[i] >= 0 && high[i] < self.last[i] << PLACE_SHIFT;
+        if !inside(0) || !inside(1) {
             return false;
         }
-        let [left, top] = low.map(|p| (p >> PLACE_SHIFT) as usize);
-        let [right, bottom] = high.map(|p| (p >> PLACE_SHIFT) as usize + 1);
+        let (left, top) = ((low[0] >> PLACE_SHIFT) as usize, (low[1] >> PLACE_SHIFT) as usize);
+        let (right, bottom) = ((high[0] >> PLACE_SHIFT) as usize + 1, (high[1] >> PLACE_SHIFT) as usize + 1);
         if right - left >= TILE_COLUMNS || bottom - top >= TILE_ROWS {
             return false;
         }
@@ -134,12 +138,18 @@ impl<'a> Source<'a> {
             *to = *bytes;
         }
 
-        // Arrays of 16-bit numbers, one step at a time: this becomes vector instructions. Places in the tile fit 16 bits.
+        // Arrays of 16-bit numbers, one step at a time: this becomes vector instructions. Loops, because `map` and `from_fn` become
+        // calls where the compiler does not inline all of them. Places in the tile fit 16 bits.
         let from = [start[0] - ((left as i32) << PLACE_SHIFT), start[1] - ((top as i32) << PLACE_SHIFT)];
-        let places: [[u16; STEP]; 2] = [0, 1]
-            .map(|i| core::array::from_fn(|k| (from[i] as u16).wrapping_add((slope[i] as u16).wrapping_mul(k as u16))));
-        let cells = places.map(|axis| axis.map(|p| p >> PLACE_SHIFT));
-        let firsts: [u16; STEP] = core::array::from_fn(|k| cells[1][k] * TILE_COLUMNS as u16 + cells[0][k]);
+        let (mut places, mut firsts) = ([[0u16; STEP]; 2], [0u16; STEP]);
+        for (axis, (from, slope)) in places.iter_mut().zip(from.into_iter().zip(slope)) {
+            for (place, k) in axis.iter_mut().zip(0u16..) {
+                *place = (from as u16).wrapping_add((slope as u16).wrapping_mul(k));
+            }
+        }
+        for k in 0..STEP {
+            firsts[k] = (places[1][k] >> PLACE_SHIFT) * TILE_COLUMNS as u16 + (places[0][k] >> PLACE_SHIFT);
+        }
         let pairs = |offset: usize| {
             let pair = |k: usize| {
                 // The remainder changes nothing; it says to the compiler that the index lies in the tile.
@@ -150,10 +160,10 @@ impl<'a> Source<'a> {
             [pair(0), pair(1), pair(2), pair(3), pair(4), pair(5), pair(6), pair(7)]
         };
         let (upper, lower) = (pairs(0), pairs(TILE_COLUMNS));
-        let [across, down] = places.map(|axis| axis.map(|p| p >> (PLACE_SHIFT - WEIGHT_SHIFT) & (WEIGHT_ONE - 1)));
         for k in 0..STEP {
-            let [upper, lower] = [upper[k], lower[k]].map(|pair| [pair & 0xff, pair >> 8]);
-            out[k] = blend(upper, lower, across[k], down[k]);
+            let weight = |place: u16| place >> (PLACE_SHIFT - WEIGHT_SHIFT) & (WEIGHT_ONE - 1);
+            let (upper, lower) = ([upper[k] & 0xff, upper[k] >> 8], [lower[k] & 0xff, lower[k] >> 8]);
+            out[k] = blend(upper, lower, weight(places[0][k]), weight(places[1][k]));
         }
         true
     }
@@ -184,10 +194,11 @@ fn weight(place: i32) -> u16 {
 /// Blends four neighbours, left and right of two rows, rounding twice. No sum exceeds 65408.
 #[inline(always)]
 fn blend(upper: [u16; 2], lower: [u16; 2], across: u16, down: u16) -> u8 {
-    let [left, right] = [0, 1].map(|i| {
-        let sum = upper[i].wrapping_mul(WEIGHT_ONE - down).wrapping_add(lower[i].wrapping_mul(down));
+    let column = |upper: u16, lower: u16| {
+        let sum = upper.wrapping_mul(WEIGHT_ONE - down).wrapping_add(lower.wrapping_mul(down));
         sum.wrapping_add(1 << (DROPPED - 1)) >> DROPPED
-    });
+    };
+    let (left, right) = (column(upper[0], lower[0]), column(upper[1], lower[1]));
     let sum = left.wrapping_mul(WEIGHT_ONE - across).wrapping_add(right.wrapping_mul(across));
     const LAST: u32 = 2 * WEIGHT_SHIFT - DROPPED;
     (sum.wrapping_add(1 << (LAST - 1)) >> LAST) as u8

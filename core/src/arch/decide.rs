@@ -1,0 +1,201 @@
+//! What becomes of the pixels that were searched for.
+
+use super::jobs::{CHUNK, Found, Search};
+use crate::disparity::{DisparityPixel, Reason};
+
+/// What is known of the windows around the pixels of a chunk beside their costs: sums of [`evidence`].
+#[derive(Clone, Debug)]
+pub(crate) struct Sums([u32; CHUNK]);
+
+/// Bits of the texture in a sum; the number of saturated pixels lies above them. 63 x 21 responses of at most 127 fit.
+const TEXTURE_BITS: u32 = 20;
+
+/// What a pixel adds to a sum: a response of at most 127, and whether it is saturated.
+#[inline(always)]
+pub(crate) const fn evidence(response: u8, saturated: bool) -> u32 {
+    response as u32 | (saturated as u32) << TEXTURE_BITS
+}
+
+impl Sums {
+    pub(crate) const fn new() -> Self {
+        Self([0; CHUNK])
+    }
+
+    /// Sums the columns under the window around each pixel of the search.
+    ///
+    /// # Bound
+    /// A step for each pixel, and for each column of the first window.
+    #[inline(always)]
+    pub(crate) fn make(&mut self, search: &Search, columns: &[u32]) {
+        let before = search.range.start.saturating_sub(search.radius + 1);
+        let leaving = columns.get(before..).unwrap_or_default();
+        let entering = columns.get(search.range.start + search.radius..).unwrap_or_default();
+        let mut sum = leaving.iter().take(2 * search.radius + 1).fold(0u32, |sum, &column| sum.wrapping_add(column));
+        // What changes first, many at a time, so that only one addition waits for the one before.
+        for ((out, &enter), &leave) in self.0.iter_mut().zip(entering).zip(leaving) {
+            *out = enter.wrapping_sub(leave);
+        }
+        for out in &mut self.0 {
+            sum = sum.wrapping_add(*out);
+            *out = sum;
+        }
+    }
+}
+
+/// The limits that decide.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Decide {
+    pub(crate) min_texture: u32,
+    pub(crate) max_saturated: u32,
+    /// Below this texture a pixel that was not told apart is weak.
+    pub(crate) weak_texture: u32,
+    /// Only the pixels that are weak are decided on, and stay weak.
+    pub(crate) only_weak: bool,
+    /// Whether ambiguous places are refused.
+    pub(crate) unique: bool,
+    /// Whether keys were found, or costs.
+    pub(crate) keys: bool,
+}
+
+impl Decide {
+    /// Writes the pixels of the chunk to `out` and which of them are weak to `weak`. Pixels without candidates keep what they
+    /// are.
+    ///
+    /// Every pixel takes the same steps, whatever becomes of it: branches would be guessed wrong too often, and the compiler
+    /// makes vectors of it.
+    ///
+    /// # Bound
+    /// A fixed number of steps for each pixel.
+    #[inline(always)]
+    pub(crate) fn run(
+        &self,
+        search: &Search,
+        found: &Found,
+        sums: &Sums,
+        out: &mut [DisparityPixel],
+        weak: &mut [bool],
+    ) {
+        let top = (search.min_disparity + search.disparities - 1) as i32;
+        let min_disparity = search.min_disparity as i32;
+        let (right_first, right_end) = (search.right_first as i32, search.right_end as i32);
+        let start = search.range.start as i32;
+        let shift = if self.keys { 7 } else { 0 };
+        let cost = |number: i16| i32::from(number.wrapping_sub(i16::MIN) as u16 >> shift);
+        let none = |reason: Reason| i32::from(DisparityPixel::none(reason).bits());
+        let (mut decided, mut untold) = ([0u16; CHUNK], [0u8; CHUNK]);
+        // Arrays of one length and one step for each pixel: this becomes vector instructions.
+        for i in 0..CHUNK {
+            let x = start + i as i32;
+            let largest = top.min(x - right_first);
+            let smallest = min_disparity.max(x + 1 - right_end);
+            let above = found.above[i];
+            // The two places beside the best one do not count.
+            let beside = 1 + u16::from(found.nearer[i] < above) + u16::from(found.farther[i] < above);
+            let ambiguous = self.unique & (found.near[i] > beside);
+            let disparity = top - i32::from(found.place[i]);
+            let offset = refine(cost(found.farther[i]), cost(found.best[i]), cost(found.nearer[i]));
+            let steps = (16 * disparity + offset).max(0);
+            // As `DisparityPixel::from_steps`; steps are below 32768 because disparities are below 2048.
+            let bits = if steps == 0 { none(Reason::OutOfRange) } else { steps };
+            let bits = if ambiguous { none(Reason::NotUnique) } else { bits };
+            // At an end of the range the true minimum may lie beyond, and there is no neighbour to interpolate with.
+            let at_end = (disparity >= largest) | (disparity <= smallest);
+            let bits = if at_end { none(Reason::OutOfRange) } else { bits };
+            let (texture, saturated) = (sums.0[i] & ((1 << TEXTURE_BITS) - 1), sums.0[i] >> TEXTURE_BITS);
+            let bits = if texture < self.min_texture { none(Reason::LowTexture) } else { bits };
+            let bits = if saturated > self.max_saturated { none(Reason::Saturated) } else { bits };
+            let told_apart = (bits != none(Reason::LowTexture)) & (bits != none(Reason::NotUnique));
+            untold[i] = u8::from(!told_apart & (texture < self.weak_texture));
+            decided[i] = if largest < smallest { 0 } else { bits as u16 };
+        }
+        if search.right_first >= search.right_end {
+            return;
+        }
+        for ((out, weak), (&decided, &untold)) in out.iter_mut().zip(weak).zip(decided.iter().zip(&untold)) {
+            let takes = (decided != 0) & (*weak | !self.only_weak);
+            *out = if takes { DisparityPixel::from_bits(decided) } else { *out };
+            *weak = if self.only_weak { *weak } else { takes & (untold != 0) };
+        }
+    }
+}
+
+/// A right pixel that nothing was offered to: farther from any disparity than a check back allows.
+pub(crate) const NO_PARTNER: i16 = i16::MAX;
+
+/// Takes out pixels whose right partner matches another left pixel better. `out` begins at pixel `first`; `right` says for each
+/// right pixel at which disparity it matches best.
+///
+/// # Bound
+/// A fixed number of steps for each pixel.
+#[inline(always)]
+pub(crate) fn back_check(tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[i16]) {
+    let mismatch = DisparityPixel::none(Reason::LeftRightMismatch).bits();
+    for (start, out) in (first..).step_by(CHUNK).zip(out.chunks_mut(CHUNK)) {
+        let (mut disparities, mut back) = ([0u16; CHUNK], [0i16; CHUNK]);
+        for (disparity, pixel) in disparities.iter_mut().zip(&*out) {
+            // Rounding to the nearest pixel may be one off the place that was chosen: half a pixel is shared.
+            *disparity = ((pixel.bits() & 0x7fff) + 8) >> 4;
+        }
+        // What is told here of pixels without a disparity does not matter.
+        for ((back, &disparity), x) in back.iter_mut().zip(&disparities).zip(start..) {
+            *back = right.get(x.wrapping_sub(usize::from(disparity))).copied().unwrap_or(NO_PARTNER);
+        }
+        for (pixel, (&disparity, &back)) in out.iter_mut().zip(disparities.iter().zip(&back)) {
+            let away = disparity.abs_diff(back as u16);
+            let refused = pixel.has_value() & (away > tolerance);
+            *pixel = DisparityPixel::from_bits(if refused { mismatch } else { pixel.bits() });
+        }
+    }
+}
+
+/// Where between its neighbours the least cost lies, 1/16 px towards the nearer one: two lines of the same slope.
+///
+/// The quotient is at most 8, so four steps of a division by hand find it: vectors have no integer division.
+#[inline(always)]
+pub(crate) fn refine(farther: i32, best: i32, nearer: i32) -> i32 {
+    let slope = farther.max(nearer) - best;
+    let difference = farther - nearer;
+    // Rounds to the nearest, halves away from zero.
+    let mut rest = 8 * difference.abs() + slope / 2;
+    let mut quotient = 0;
+    for bit in [8, 4, 2, 1] {
+        let fits = rest >= bit * slope;
+        rest -= if fits { bit * slope } else { 0 };
+        quotient += if fits { bit } else { 0 };
+    }
+    let quotient = if slope <= 0 { 0 } else { quotient };
+    if difference < 0 { -quotient } else { quotient }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::refine;
+
+    /// As it is written down in integers.
+    fn in_integers(farther: i64, best: i64, nearer: i64) -> i64 {
+        let slope = farther.max(nearer) - best;
+        let scaled = 8 * (farther - nearer);
+        if slope == 0 { 0 } else { (scaled + scaled.signum() * (slope / 2)) / slope }
+    }
+
+    #[test]
+    fn the_quotient_is_that_of_integers() {
+        let check = |farther: i32, best: i32, nearer: i32| {
+            let expected = in_integers(i64::from(farther), i64::from(best), i64::from(nearer));
+            let found = refine(farther, best, nearer);
+            assert_eq!(i64::from(found), expected, "{farther} {best} {nearer}");
+        };
+        // A best cost of 0 loses nothing: only differences count.
+        for farther in 0..512 {
+            for nearer in 0..512 {
+                check(farther, 0, nearer);
+            }
+        }
+        for farther in (0..=65535).step_by(97).chain(65400..=65535) {
+            for nearer in (0..=65535).step_by(89).chain(65450..=65535) {
+                check(farther, 0, nearer);
+                check(farther, farther.min(nearer) / 3, nearer);
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The search by costs, for windows whose costs and places do not fit 16 bits together.
+
+use super::{PLACES, Vector, Wide, is_outside, outside_is_nothing, search_fits};
+use crate::arch::jobs::{Found, PAD, Right, Search};
+
+/// What stands where there is no disparity, between the costs of bytes, less 32768; 16 times this is still a large number.
+const NO_COST: i16 = 0x07ff;
+
+/// # Safety
+/// The processor must have the instructions of `V`.
+#[inline(always)]
+pub(in crate::arch) unsafe fn search_costs<V: Vector>(
+    search: &Search,
+    columns: &[u8],
+    work: &mut [i16],
+    right: Option<Right<'_>>,
+    found: &mut Found,
+) {
+    if search.range.is_empty() || !search_fits::<V>(search, columns, work, right.as_ref()) {
+        return;
+    }
+    let inner = search.inner();
+    let tables = right.map(|right| right.tables.map(|table| table.as_mut_ptr()));
+    // SAFETY: all that is touched was seen to lie in the slices; the caller guarantees the instructions.
+    unsafe {
+        let costs = work.as_mut_ptr().add(PAD);
+        if !search.follows {
+            begin_costs::<V>(search, columns, costs);
+        }
+        if search.is_small && tables.is_none() && inner == search.range {
+            match search.stride / V::LANES {
+                1 => return cost_run::<V, 1>(search, columns, costs, found),
+                2 => return cost_run::<V, 2>(search, columns, costs, found),
+                3 => return cost_run::<V, 3>(search, columns, costs, found),
+                4 => return cost_run::<V, 4>(search, columns, costs, found),
+                6 => return cost_run::<V, 6>(search, columns, costs, found),
+                8 => return cost_run::<V, 8>(search, columns, costs, found),
+                _ => (),
+            }
+        }
+        for x in search.range.clone() {
+            if inner.contains(&x) {
+                cost_pixel::<V, false>(search, columns, costs, tables, x, found);
+            } else {
+                cost_pixel::<V, true>(search, columns, costs, tables, x, found);
+            }
+        }
+    }
+}
+
+/// # Safety
+/// That of [`search_costs`], and that [`search_fits`].
+#[inline(always)]
+unsafe fn begin_costs<V: Vector>(search: &Search, columns: &[u8], costs: *mut i16) {
+    // SAFETY: that of this function.
+    unsafe {
+        for first in (0..search.stride).step_by(V::LANES) {
+            let mut sums = [V::Wide::splat(i16::MIN); 2];
+            for x in search.range.start - search.radius - 1..search.range.start + search.radius {
+                let [low, high] = V::load(columns.as_ptr().add(x * search.stride + first)).widen();
+                sums = [sums[0].add(low), sums[1].add(high)];
+            }
+            for half in 0..2 {
+                let place = first + half * V::Wide::LANES;
+                let inside = outside_is_nothing::<V>(sums[half], place, &(0..search.disparities));
+                // Sums of bytes under a window are all below this.
+                inside.min(V::Wide::splat(NO_COST)).store(costs.add(place));
+            }
+        }
+    }
+}
+
+/// # Safety
+/// That of [`search_costs`], and that [`search_fits`].
+#[inline(always)]
+unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
+    search: &Search,
+    columns: &[u8],
+    costs: *mut i16,
+    tables: Option<[*mut i16; 2]>,
+    x: usize,
+    found: &mut Found,
+) {
+    // SAFETY: that of this function.
+    unsafe {
+        let stride = search.stride;
+        let enter = columns.as_ptr().add((x + search.radius) * stride);
+        let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+        let candidates = if BORDER { search.candidates(x) } else { 0..search.disparities };
+        let nothing = V::Wide::splat(i16::MAX);
+        let places = V::Wide::load(PLACES.as_ptr());
+        let top = V::Wide::splat((search.min_disparity + search.disparities - 1) as i16);
+        let mut least = nothing;
+        for first in (0..stride).step_by(V::LANES) {
+            let (enter, leave) = (V::load(enter.add(first)).widen(), V::load(leave.add(first)).widen());
+            for half in 0..2 {
+                let place = first + half * V::Wide::LANES;
+                let cost = V::Wide::load(costs.add(place)).add(enter[half].sub(leave[half]));
+                cost.store(costs.add(place));
+                if BORDER && is_outside::<V>(place, &candidates) {
+                    continue;
+                }
+                let cost = if BORDER { outside_is_nothing::<V>(cost, place, &candidates) } else { cost };
+                least = least.min(cost);
+                if let Some([best, disparities]) = tables {
+                    let (best, disparities) = (best.add(x + place), disparities.add(x + place));
+                    let (before, told) = (V::Wide::load(best), V::Wide::load(disparities));
+                    let offered = top.sub(V::Wide::splat(place as i16)).sub(places);
+                    before.min(cost).store(best);
+                    told.xor(told.xor(offered).and(before.greater(cost))).store(disparities);
+                }
+            }
+        }
+        if BORDER && candidates.is_empty() {
+            return;
+        }
+        let cost = least.least();
+        let above = search.above(cost);
+        let bound = V::Wide::splat(above);
+        let best = V::Wide::splat(cost);
+        let mut near = V::Wide::splat(0);
+        // The first of equal places: those that are not equal are 32767 or so.
+        let mut first = nothing;
+        for place in (0..stride).step_by(V::Wide::LANES) {
+            if BORDER && is_outside::<V>(place, &candidates) {
+                continue;
+            }
+            let cost = V::Wide::load(costs.add(place));
+            let cost = if BORDER { outside_is_nothing::<V>(cost, place, &candidates) } else { cost };
+            near = near.add(bound.greater(cost));
+            let here = places.add(V::Wide::splat(place as i16));
+            first = first.min(nothing.xor(nothing.xor(here).and(best.equal(cost))));
+        }
+        let place = first.least() as usize % stride;
+        // There is room on both sides.
+        let beside = [*costs.add(place).sub(1), cost, *costs.add(place + 1)];
+        found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
+    }
+}
+
+/// Pixels that have all candidates, with columns of `BLOCKS` vectors and costs of at most 2040: as [`cost_pixel`], but cost and
+/// number of the vector go together through the search, and only the place in the vector is left to find.
+///
+/// # Safety
+/// That of [`search_costs`], and that [`search_fits`].
+#[inline(always)]
+unsafe fn cost_run<V: Vector, const BLOCKS: usize>(
+    search: &Search,
+    columns: &[u8],
+    costs: *mut i16,
+    found: &mut Found,
+) {
+    // SAFETY: that of this function.
+    unsafe {
+        let stride = BLOCKS * V::LANES;
+        for x in search.range.clone() {
+            let enter = columns.as_ptr().add((x + search.radius) * stride);
+            let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+            let mut least = V::Wide::splat(i16::MAX);
+            for block in 0..BLOCKS {
+                let first = block * V::LANES;
+                let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_signed();
+                for half in 0..2 {
+                    let place = first + half * V::Wide::LANES;
+                    let cost = V::Wide::load(costs.add(place)).add(change[half]);
+                    cost.store(costs.add(place));
+                    // The 32768 that costs are less by falls out at the top.
+                    least = least.min(cost.times_16().add(V::Wide::splat((2 * block + half) as i16)));
+                }
+            }
+            let key = least.least();
+            let place = (key & 15) as usize * V::Wide::LANES + least.first_equal(V::Wide::splat(key));
+            let best = (key >> 4).wrapping_add(i16::MIN);
+            let above = search.above(best);
+            let bound = V::Wide::splat(above);
+            let mut near = V::Wide::splat(0);
+            for half in 0..2 * BLOCKS {
+                near = near.add(bound.greater(V::Wide::load(costs.add(half * V::Wide::LANES))));
+            }
+            // There is room on both sides.
+            let beside = [*costs.add(place).sub(1), best, *costs.add(place + 1)];
+            let near = V::Wide::splat(0).sub(near).sum() as u16;
+            found.put(x - search.range.start, place, beside, near, above);
+        }
+    }
+}

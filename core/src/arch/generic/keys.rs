@@ -1,0 +1,200 @@
+//! The search by keys of cost and place.
+
+use core::ops::Range;
+
+use super::{PLACES, Vector, Wide, is_outside, outside_is_nothing, search_fits};
+use crate::arch::jobs::{Found, KeyLimits, PAD, Right, Search};
+
+/// # Safety
+/// The processor must have the instructions of `V`.
+#[inline(always)]
+pub(in crate::arch) unsafe fn search_keys<V: Vector>(
+    search: &Search,
+    limits: &KeyLimits,
+    columns: &[u8],
+    work: &mut [i16],
+    right: Right<'_>,
+    found: &mut Found,
+) {
+    if search.range.is_empty() || !search_fits::<V>(search, columns, work, Some(&right)) {
+        return;
+    }
+    let (inner, range) = (search.inner(), search.range.clone());
+    let tables = right.tables.map(|table| table.as_mut_ptr());
+    // SAFETY: all that is touched was seen to lie in the slices; the caller guarantees the instructions.
+    unsafe {
+        let keys = work.as_mut_ptr().add(PAD);
+        if !search.follows {
+            begin_keys::<V>(search, columns, keys);
+        }
+        for x in range.start..inner.start {
+            key_pixel::<V, true>(search, limits, columns, keys, tables, x, found);
+        }
+        match search.stride / V::LANES {
+            1 => key_run::<V, 1>(search, limits, columns, keys, tables, inner.clone(), found),
+            2 => key_run::<V, 2>(search, limits, columns, keys, tables, inner.clone(), found),
+            3 => key_run::<V, 3>(search, limits, columns, keys, tables, inner.clone(), found),
+            4 => key_run::<V, 4>(search, limits, columns, keys, tables, inner.clone(), found),
+            6 => key_run::<V, 6>(search, limits, columns, keys, tables, inner.clone(), found),
+            8 => key_run::<V, 8>(search, limits, columns, keys, tables, inner.clone(), found),
+            _ => {
+                for x in inner.clone() {
+                    key_pixel::<V, false>(search, limits, columns, keys, tables, x, found);
+                }
+            }
+        }
+        for x in inner.end..range.end {
+            key_pixel::<V, true>(search, limits, columns, keys, tables, x, found);
+        }
+    }
+}
+
+/// The keys of the pixel before the first: cost and place of each, and the largest key behind the last one.
+///
+/// # Safety
+/// That of [`search_keys`], and that [`search_fits`].
+#[inline(always)]
+unsafe fn begin_keys<V: Vector>(search: &Search, columns: &[u8], keys: *mut i16) {
+    // SAFETY: that of this function.
+    unsafe {
+        let nothing = V::Wide::splat(i16::MAX);
+        let end = V::Wide::splat((search.disparities as i16).wrapping_add(i16::MIN));
+        for first in (0..search.stride).step_by(V::LANES) {
+            let places = V::Wide::load(PLACES.as_ptr()).add(V::Wide::splat((first as i16).wrapping_add(i16::MIN)));
+            let mut sums = [places, places.add(V::Wide::splat(V::Wide::LANES as i16))];
+            let inside = [end.greater(sums[0]), end.greater(sums[1])];
+            for x in search.range.start - search.radius - 1..search.range.start + search.radius {
+                let [low, high] = V::load(columns.as_ptr().add(x * search.stride + first)).widen_shifted();
+                sums = [sums[0].add(low), sums[1].add(high)];
+            }
+            for half in 0..2 {
+                let key = nothing.xor(nothing.xor(sums[half]).and(inside[half]));
+                key.store(keys.add(first + half * V::Wide::LANES));
+            }
+        }
+    }
+}
+
+/// # Safety
+/// That of [`search_keys`], and that [`search_fits`].
+#[inline(always)]
+unsafe fn key_pixel<V: Vector, const BORDER: bool>(
+    search: &Search,
+    limits: &KeyLimits,
+    columns: &[u8],
+    keys: *mut i16,
+    tables: [*mut i16; 2],
+    x: usize,
+    found: &mut Found,
+) {
+    // SAFETY: that of this function.
+    unsafe {
+        let stride = search.stride;
+        let enter = columns.as_ptr().add((x + search.radius) * stride);
+        let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+        let candidates = if BORDER { search.candidates(x) } else { 0..search.disparities };
+        let nothing = V::Wide::splat(i16::MAX);
+        let turn = V::Wide::splat(0x7f);
+        let table = tables[x % 2].add(x);
+        let mut least = nothing;
+        for first in (0..stride).step_by(V::LANES) {
+            let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_shifted();
+            for half in 0..2 {
+                let place = first + half * V::Wide::LANES;
+                let key = V::Wide::load(keys.add(place)).add(change[half]);
+                key.store(keys.add(place));
+                if BORDER && is_outside::<V>(place, &candidates) {
+                    continue;
+                }
+                let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
+                least = least.min(key);
+                V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
+            }
+        }
+        if BORDER && candidates.is_empty() {
+            return;
+        }
+        let least = least.least();
+        let place = (least & 0x7f) as usize;
+        let above = limits.above(least);
+        let bound = V::Wide::splat(above);
+        let mut near = V::Wide::splat(0);
+        for place in (0..stride).step_by(V::Wide::LANES) {
+            if BORDER && is_outside::<V>(place, &candidates) {
+                continue;
+            }
+            let key = V::Wide::load(keys.add(place));
+            let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
+            near = near.add(bound.greater(key));
+        }
+        // There is room on both sides.
+        let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
+        found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
+    }
+}
+
+/// Pixels that have all candidates, with columns of `BLOCKS` vectors: as [`key_pixel`], without loops, and with the keys in
+/// registers where there are enough of them.
+///
+/// # Safety
+/// That of [`search_keys`], and that [`search_fits`].
+#[inline(always)]
+unsafe fn key_run<V: Vector, const BLOCKS: usize>(
+    search: &Search,
+    limits: &KeyLimits,
+    columns: &[u8],
+    keys: *mut i16,
+    tables: [*mut i16; 2],
+    range: Range<usize>,
+    found: &mut Found,
+) {
+    // SAFETY: that of this function.
+    unsafe {
+        let stride = BLOCKS * V::LANES;
+        let kept = BLOCKS <= 4;
+        let turn = V::Wide::splat(0x7f);
+        let mut current = [[V::Wide::splat(0); 2]; BLOCKS];
+        if kept {
+            for block in 0..BLOCKS {
+                let at = keys.add(block * V::LANES);
+                current[block] = [V::Wide::load(at), V::Wide::load(at.add(V::Wide::LANES))];
+            }
+        }
+        for x in range {
+            let enter = columns.as_ptr().add((x + search.radius) * stride);
+            let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+            let table = tables[x % 2].add(x);
+            let mut least = V::Wide::splat(i16::MAX);
+            for block in 0..BLOCKS {
+                let first = block * V::LANES;
+                let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_shifted();
+                for half in 0..2 {
+                    let place = first + half * V::Wide::LANES;
+                    let before = if kept { current[block][half] } else { V::Wide::load(keys.add(place)) };
+                    let key = before.add(change[half]);
+                    if kept {
+                        current[block][half] = key;
+                    }
+                    key.store(keys.add(place));
+                    least = least.min(key);
+                    V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
+                }
+            }
+            let least = least.least();
+            let place = (least & 0x7f) as usize;
+            let above = limits.above(least);
+            let bound = V::Wide::splat(above);
+            let mut near = V::Wide::splat(0);
+            for block in 0..BLOCKS {
+                for half in 0..2 {
+                    let place = block * V::LANES + half * V::Wide::LANES;
+                    let key = if kept { current[block][half] } else { V::Wide::load(keys.add(place)) };
+                    near = near.add(bound.greater(key));
+                }
+            }
+            // There is room on both sides.
+            let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
+            found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! The inner loops of the matcher, for the processor at hand.
+//!
+//! One algorithm ([`generic`]) stands over a small vector trait; a backend brings the vectors and a thin layer of functions
+//! that are compiled for its instructions. [`plain`] is the same in plain Rust, for every processor: what the others are held
+//! against, bit by bit. This is the only place of the core with `unsafe`.
+//!
+//! On x86-64 the processor is asked when a matcher is configured ([`Backend::fastest`]); elsewhere the compiler's target says
+//! it. No call goes through a pointer: each step is a `match` on the backend, once for a row or for 64 pixels.
+//!
+//! # What it costs
+//! Instructions for 32 disparities of a pixel with AVX2, as compiled:
+//!
+//! | step | loads | arithmetic | stores | limited by |
+//! | --- | --- | --- | --- | --- |
+//! | a row into and out of the column sums | 5 | 7: four table look-ups, three sums | 1 | loads: half of the unaligned ones lie in two lines of the cache |
+//! | sums under the window, as keys | 2 | 8 | 2 | arithmetic |
+//! | best left partner of each right pixel | 2 | 4 | 2 | stores: one vector in a cycle |
+//! | least key, and the others that are nearly as good | 0 | 6 | 0 | arithmetic |
+//!
+//! Beside that some 40 instructions for each pixel: the least of a vector, its neighbours, what is found. SSE2 takes twice as many
+//! vectors, and 25 instead of 7 to count bits without look-up. To decide takes some 60 instructions for eight pixels. The
+//! wide window is asked for weak pixels only, and made afresh at each run of them.
+
+mod decide;
+#[cfg(target_arch = "x86_64")]
+#[expect(clippy::needless_range_loop, reason = "loops of a fixed number of rounds, by number, are what is unrolled")]
+#[expect(unsafe_code, reason = "vectors are loaded and stored through pointers, within bounds that are checked before")]
+mod generic;
+mod jobs;
+mod plain;
+#[cfg(target_arch = "x86_64")]
+#[expect(unsafe_code, reason = "instructions that not every processor has, used where it has them")]
+mod x86_64;
+
+pub(crate) use decide::{Decide, NO_PARTNER, Sums, back_check, evidence, refine};
+pub(crate) use jobs::{CHUNK, CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
+
+/// Whose instructions the inner loops are made of. All of them give the same bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Backend {
+    /// Plain Rust, which the compiler makes what it can of.
+    Plain = 0,
+    /// x86-64 without extensions: 16 bytes at a time.
+    Sse2 = 1,
+    /// x86-64 with SSE4.1 and SSSE3: 16 bytes at a time, bits counted by looking them up.
+    Sse41 = 2,
+    /// x86-64 with AVX2: 32 bytes at a time.
+    Avx2 = 3,
+}
+
+impl Backend {
+    /// Every backend, slowest first.
+    pub const ALL: &[Self] = &[Self::Plain, Self::Sse2, Self::Sse41, Self::Avx2];
+
+    /// Name as it is written in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Sse2 => "sse2",
+            Self::Sse41 => "sse4.1",
+            Self::Avx2 => "avx2",
+        }
+    }
+
+    /// Whether this processor has the instructions, and the operating system keeps their registers.
+    pub fn is_available(self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        return x86_64::is_available(self);
+        #[cfg(not(target_arch = "x86_64"))]
+        return self == Self::Plain;
+    }
+
+    /// The last one of [`Self::ALL`] that is available.
+    pub fn fastest() -> Self {
+        Self::ALL.iter().rev().copied().find(|backend| backend.is_available()).unwrap_or(Self::Plain)
+    }
+
+    /// The next slower one; plain Rust after itself.
+    pub(crate) fn slower(self) -> Self {
+        Self::ALL.iter().rev().copied().find(|&other| other < self).unwrap_or(Self::Plain)
+    }
+
+    /// Bytes that are worked on at once: tables are padded to a multiple.
+    pub(crate) const fn lanes(self) -> usize {
+        match self {
+            Self::Plain => 1,
+            Self::Sse2 | Self::Sse41 => 16,
+            Self::Avx2 => 32,
+        }
+    }
+
+    /// Whether right codes are kept as two rows of four bits each, to be looked up.
+    pub(crate) const fn splits_codes(self) -> bool {
+        matches!(self, Self::Sse41 | Self::Avx2)
+    }
+}
+
+/// A backend that is available. A matcher that is not configured has the plain one, which is all zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Chosen(Backend);
+
+impl Chosen {
+    pub(crate) const PLAIN: Self = Self(Backend::Plain);
+
+    /// `None` if the processor does not have the instructions.
+    pub(crate) fn new(backend: Backend) -> Option<Self> {
+        backend.is_available().then_some(Self(backend))
+    }
+
+    pub(crate) const fn backend(self) -> Backend {
+        self.0
+    }
+}
+
+/// Lets a row of census codes into the sums of its columns and another one out.
+///
+/// # Bound
+/// `width x disparities` steps.
+pub(crate) fn slide_codes(chosen: Chosen, job: SlideCodes<'_>) {
+    match chosen.0 {
+        #[cfg(target_arch = "x86_64")]
+        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => x86_64::slide_codes(chosen, job),
+        _ => plain::slide_codes(job),
+    }
+}
+
+/// Lets a row of grey values into the sums of its columns and another one out.
+///
+/// # Bound
+/// `width x disparities` steps.
+pub(crate) fn slide_grey(
+    columns: &mut [[u8; 2]],
+    disparities: usize,
+    min_disparity: usize,
+    enter: (&[u8], &[u8]),
+    leave: Option<(&[u8], &[u8])>,
+) {
+    plain::slide_grey(columns, disparities, min_disparity, enter, leave);
+}
+
+/// The best places of up to [`CHUNK`] pixels of a row, from keys of cost and place: for costs below 512 and places below 128.
+///
+/// # Bound
+/// `pixels x disparities` steps, and as many for each column of the window where the sums are made afresh.
+pub(crate) fn search_keys(
+    chosen: Chosen,
+    search: &Search,
+    limits: &KeyLimits,
+    columns: &[u8],
+    work: &mut [i16],
+    right: Right<'_>,
+    found: &mut Found,
+) {
+    match chosen.0 {
+        #[cfg(target_arch = "x86_64")]
+        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
+            x86_64::search_keys(chosen, search, limits, columns, work, right, found);
+        }
+        _ => plain::search_keys(search, limits, columns, work, right, found),
+    }
+}
+
+/// The best places of up to [`CHUNK`] pixels of a row, for sums of bytes whose window sums fit 16 bits. `right` is `None` where
+/// the right pixels are not asked.
+///
+/// # Bound
+/// That of [`search_keys`], twice.
+pub(crate) fn search_bytes(
+    chosen: Chosen,
+    search: &Search,
+    columns: &[u8],
+    work: &mut [i16],
+    right: Option<Right<'_>>,
+    found: &mut Found,
+) {
+    match chosen.0 {
+        #[cfg(target_arch = "x86_64")]
+        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
+            x86_64::search_costs(chosen, search, columns, work, right, found);
+        }
+        _ => plain::search_costs(search, columns, work, right, found),
+    }
+}
+
+/// As [`search_bytes`], for sums of 16 bits.
+pub(crate) fn search_words(
+    search: &Search,
+    columns: &[[u8; 2]],
+    work: &mut [i16],
+    right: Option<Right<'_>>,
+    found: &mut Found,
+) {
+    plain::search_costs(search, columns, work, right, found);
+}
+
+/// Steps in plain Rust that are compiled for the chosen backend. `run`, and what it calls, is to be `inline(always)`: that is why
+/// this is not a closure.
+pub(crate) trait Steps {
+    fn run(self);
+}
+
+/// Runs steps with the instructions of the chosen backend.
+#[inline(always)]
+pub(crate) fn compiled(chosen: Chosen, steps: impl Steps) {
+    #[cfg(target_arch = "x86_64")]
+    x86_64::compiled(chosen, steps);
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        let _ = chosen;
+        steps.run();
+    }
+}

@@ -1,0 +1,51 @@
+//! Which of the ways to search fits the settings.
+
+use super::{MatchCost, MatchSettings, rows::LEAD_ROWS};
+use crate::arch::{Backend, Chosen, PAD};
+
+/// What follows from the settings and the processor, and changes no result.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    pub(super) chosen: Chosen,
+    /// Sums of a column, the disparities and what is needed to fill vectors.
+    pub(super) stride: usize,
+    /// Whether cost and place of the narrow window fit 16 bits together.
+    pub(super) keys: bool,
+    /// Places in front of the first pixel in the tables of right pixels.
+    pub(super) lead: usize,
+    /// What the disparity is beyond the number in the key of a right pixel.
+    pub(super) key_disparity: u16,
+}
+
+impl Plan {
+    pub(super) const UNSET: Self = Self { chosen: Chosen::PLAIN, stride: 0, keys: false, lead: 0, key_disparity: 0 };
+
+    /// The plan for `settings`, which were checked, for pictures of `width` in tables for up to `WIDTH` and `DISPARITIES`.
+    ///
+    /// Tables are padded for vectors; where there is no room for that the next slower backend serves, plain Rust at last.
+    pub(super) fn new<const WIDTH: usize, const DISPARITIES: usize>(
+        backend: Backend,
+        settings: &MatchSettings,
+        width: usize,
+    ) -> Self {
+        let (disparities, min_disparity) = (usize::from(settings.disparities), usize::from(settings.min_disparity));
+        let largest = u32::from(settings.window_width) * u32::from(settings.window_height) * 8;
+        let keys = settings.cost == MatchCost::Census && largest <= 510 && disparities <= 128;
+        let back = min_disparity + disparities - 1;
+        // Keys count places from 0 at the largest disparity; turned, from 127 down.
+        let key_disparity = (back as u16).wrapping_sub(127);
+        let mut backend = if settings.cost == MatchCost::Census { backend } else { Backend::Plain };
+        while backend != Backend::Plain {
+            let stride = disparities.next_multiple_of(backend.lanes());
+            let room = width * stride <= WIDTH * DISPARITIES * 2
+                && back <= LEAD_ROWS * WIDTH
+                && width + stride <= WIDTH + WIDTH / 2
+                && stride + 2 * PAD <= 4 * DISPARITIES;
+            if let Some(chosen) = Chosen::new(backend).filter(|_| room) {
+                return Self { chosen, stride, keys, lead: back, key_disparity };
+            }
+            backend = backend.slower();
+        }
+        Self { chosen: Chosen::PLAIN, stride: disparities, keys, lead: 0, key_disparity }
+    }
+}
