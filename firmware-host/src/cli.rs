@@ -6,7 +6,7 @@ use clap::{
     Args, Parser, Subcommand, ValueEnum,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
-use fencepost_core::methods::DetectorKind;
+use fencepost_core::{arch::Backend, methods::DetectorKind};
 
 use crate::{compare::Method, live::MAX_PAIRS, words};
 
@@ -173,12 +173,25 @@ pub struct BenchArgs {
     /// Pairs that are worked on side by side, each by a thread with a detector of its own.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=MAX_PAIRS as i64))]
     pub threads: u8,
+    /// Whose instructions the matching is made of: plain, sse2, sse4.1 or avx2; the fastest that the processor has if left out.
+    /// No result depends on it.
+    #[arg(long, value_name = "NAME", value_parser = backend)]
+    pub backend: Option<Backend>,
     /// The figures as JSON.
     #[arg(long)]
     pub json: bool,
     /// Settings of the detector and of the bus.
     #[command(flatten)]
     pub detector: DetectorArgs,
+}
+
+/// A backend that this processor has.
+fn backend(name: &str) -> Result<Backend, String> {
+    let named = Backend::ALL.iter().copied().find(|backend| backend.name() == name);
+    let available = Backend::ALL.iter().filter(|backend| backend.is_available()).map(|backend| backend.name());
+    named
+        .filter(|backend| backend.is_available())
+        .ok_or_else(|| format!("this processor has {}", available.collect::<Vec<_>>().join(", ")))
 }
 
 /// Width and height of pictures, px.

@@ -3,6 +3,7 @@
 mod common;
 
 use common::{fencepost, recording};
+use fencepost_core::arch::Backend;
 use predicates::{prelude::*, str::contains};
 use serde_json::Value;
 
@@ -28,7 +29,7 @@ fn figures_of_a_rendered_trail() {
     assert!(sum > 0.0 && total > 0.0 && total <= p99 && p99 <= max, "{found:#}");
     assert_eq!((&found["frames"], &found["threads"]), (&9.into(), &1.into()));
     assert_eq!((&found["width"], &found["height"], &found["disparities"]), (&160.into(), &120.into(), &32.into()));
-    assert_eq!(found["backend"], "plain");
+    assert_eq!(found["backend"], Backend::fastest().name());
     let capacities = fencepost_core::detector::Capacities::for_pictures(160, 120, 32);
     assert_eq!(found["memory_bytes"], fencepost_core::detector::memory_bytes(&capacities));
 }
@@ -45,7 +46,17 @@ fn a_recording_in_its_own_size_and_in_others() {
         assert!(found["stages"]["rectify"].as_f64().unwrap() > 0.0, "{found:#}");
     }
     let text = fencepost().args(["bench", "--frames", "2", "--recording", path]).assert().success();
-    text.stdout(contains("160 × 120 px, 32 disparities").and(contains("rectify")).and(contains("backend     plain")));
+    text.stdout(contains("160 × 120 px, 32 disparities").and(contains("rectify")).and(contains("backend")));
+}
+
+#[test]
+fn every_backend_of_this_processor_is_measured() {
+    for backend in Backend::ALL.iter().filter(|backend| backend.is_available()) {
+        let found = figures(&["--size", "96x64", "--frames", "2", "--backend", backend.name()]);
+        assert_eq!(found["backend"], backend.name());
+    }
+    let unknown = fencepost().args(["bench", "--backend", "mmx"]).assert().code(2);
+    unknown.stderr(contains("this processor has plain"));
 }
 
 #[test]

@@ -11,6 +11,7 @@ use std::{
 };
 
 use fencepost_core::{
+    arch::Backend,
     settings::Settings,
     wire::{Frame, Scan, ScanEncoder, WireConfig},
 };
@@ -45,6 +46,8 @@ pub struct Job<'a> {
     pub settings: &'a Settings,
     /// Settings of the bus.
     pub wire: WireConfig,
+    /// Whose instructions the matching is made of; the fastest that the processor has if there is none.
+    pub backend: Option<Backend>,
     /// The configuration file, for errors.
     pub file: Option<&'a Path>,
     /// Threads that work at the same time, at most [`MAX_PAIRS`]: so many detectors the program has.
@@ -105,6 +108,7 @@ struct Worker<'a> {
 impl<'a> Worker<'a> {
     fn new(detector: &'a mut ProgramDetector, pictures: &BenchPictures, job: &Job<'_>) -> Result<Self, Failure> {
         let failure = |error| Failure::config(error, job.file);
+        detector.set_backend(job.backend.unwrap_or_else(Backend::fastest));
         detector.configure(job.settings, &pictures.calibration, &pictures.mount).map_err(failure)?;
         let encoder = ScanEncoder::new(job.wire).map_err(failure)?;
         let mut worker = Self { detector, encoder: Box::new(encoder), payloads: Box::default(), next: 0 };

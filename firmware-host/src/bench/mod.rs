@@ -8,7 +8,10 @@ mod pictures;
 pub use measure::{Job, Measurement, measure};
 pub use pictures::{BenchPictures, Pair};
 
-use fencepost_core::detector::{Capacities, Stage, memory_bytes};
+use fencepost_core::{
+    arch::Backend,
+    detector::{Capacities, Stage, memory_bytes},
+};
 use serde_json::{Map, Value, json};
 
 use crate::{stopwatch::TimeSummary, words};
@@ -23,7 +26,7 @@ pub struct Report {
     /// Disparities searched.
     pub disparities: u16,
     /// Which instructions the matching uses.
-    pub backend: &'static str,
+    pub backend: Backend,
     /// The times.
     pub measurement: Measurement,
 }
@@ -64,7 +67,7 @@ impl Report {
             "max_ms": times.max_ms,
             "stages": stages,
             "memory_bytes": self.memory_bytes(),
-            "backend": self.backend,
+            "backend": self.backend.name(),
             "threads": self.measurement.threads,
             "frames": self.measurement.frames.len(),
             "pictures": self.pictures,
@@ -85,7 +88,7 @@ impl Report {
                 1 => format!("{:<11} {} frames on one thread", "measured", frames.len()),
                 threads => format!("{:<11} {} frames on {threads} threads at once", "measured", frames.len()),
             },
-            format!("{:<11} {}", "backend", self.backend),
+            format!("{:<11} {}", "backend", self.backend.name()),
             format!("{:<11} {} of state", "memory", words::bytes(self.memory_bytes())),
             String::new(),
             format!("{:<11} {:>10} {:>10} {:>10}", "stage", "median ms", "p99 ms", "max ms"),

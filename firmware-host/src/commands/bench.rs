@@ -1,6 +1,6 @@
 //! `bench`: how long the detector takes.
 
-use fencepost_core::wire::WireConfig;
+use fencepost_core::{arch::Backend, wire::WireConfig};
 
 use super::Ending;
 use crate::{
@@ -13,9 +13,6 @@ use crate::{
 
 /// Size of the rendered pictures unless another one is asked for: that of the LAGR robot.
 const RENDERED_SIZE: (u32, u32) = (512, 384);
-
-/// The matching has one implementation, in plain Rust.
-const BACKEND: &str = "plain";
 
 /// Measures how long the detector takes from a raw pair to CAN payloads.
 ///
@@ -36,13 +33,14 @@ pub fn bench(args: &BenchArgs, console: &mut Console) -> Result<Ending, Failure>
     let settings = config.settings_for(size.0);
     console.note(format_args!("{}: {} pairs in memory", pictures.name, pictures.pairs.len()));
     let (threads, frames) = (usize::from(args.threads), args.frames as usize);
-    let job = Job { settings: &settings, wire, file: config.file.as_deref(), threads, frames };
+    let backend = args.backend;
+    let job = Job { settings: &settings, wire, backend, file: config.file.as_deref(), threads, frames };
     let measurement = measure(&pictures, &job)?;
     let report = Report {
         pictures: pictures.name,
         size,
         disparities: settings.matching.disparities,
-        backend: BACKEND,
+        backend: args.backend.unwrap_or_else(Backend::fastest),
         measurement,
     };
     match args.json {
