@@ -286,7 +286,9 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let need_obstacle =
             (self.settings.obstacle_cover * obstacle_area).max(f32::from(self.settings.obstacle_min_pixels));
         let need_free = (self.settings.free_cover * across * along).max(f32::from(self.settings.free_min_pixels));
-        let for_obstacle = f32::from(evidence.obstacle) + self.settings.unclear_share * f32::from(evidence.unclear);
+        // Without ground heights are those above the mount's plane, and what is unclear stays so.
+        let unclear_share = if ground_seen { self.settings.unclear_share } else { 0.0 };
+        let for_obstacle = f32::from(evidence.obstacle) + unclear_share * f32::from(evidence.unclear);
         if for_obstacle >= need_obstacle {
             let (pixels, height_dm) = (evidence.obstacle, evidence.height_dm);
             return Cell { state: CellState::Obstacle, pixels, height_dm, ..Cell::CERTAIN };

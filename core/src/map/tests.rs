@@ -534,7 +534,7 @@ fn obstacles_smear_cells_with_few_pixels_right_behind_them() {
         assert_eq!(left_over(j, &[(1, 99)], &settings), [false], "{j}");
         assert_eq!(left_over(j, &[(2, 99)], &settings), [false], "{j}");
         assert_eq!(left_over(j, &[(3, 99)], &settings), [true], "{j}: too far behind");
-        assert_eq!(left_over(j, &[(1, 101)], &settings), [true], "{j}: enough of its own");
+        assert_eq!(left_over(j, &[(1, 140)], &settings), [true], "{j}: enough of its own");
         // What was taken out still stands for nothing itself.
         assert_eq!(left_over(j, &[(2, 90), (3, 20)], &settings), [false, false], "{j}");
         let never = MapSettings { smear_share: 0.0, ..settings };
