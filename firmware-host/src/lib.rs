@@ -12,7 +12,7 @@
 //! ```
 //!
 //! Live, `run` goes another way: [`live`] leads from cameras to a bus in threads of its own. [`record`] writes down what cameras
-//! see, and [`listen`] shows what is on a bus. [`bench`] measures how long a frame takes.
+//! see, and [`listen`] shows what is on a bus. [`mod@bench`] measures how long a frame takes.
 //!
 //! Everything that can go wrong is a [`error::Failure`]: what is wrong, where, and the mend. The exit status is 0 if
 //! everything worked, 1 if the work failed or the input is bad, 2 if the program was called wrongly or its configuration
