@@ -122,7 +122,7 @@ pub(super) fn search_keys(
             *best = (*best).min(key ^ 0x7f);
         }
         let place = usize::from(least as u16 & 0x7f);
-        let above = limits.above(least);
+        let above = limits.above(least, found.weak(i));
         let near = inside.iter().fold(0u16, |near, &key| near + u16::from(key < above));
         let at = |place: Option<usize>| place.and_then(|place| keys.get(place)).copied().unwrap_or(i16::MAX);
         found.put(i, place, [at(place.checked_sub(1)), least, at(Some(place + 1))], near, above);
@@ -163,7 +163,7 @@ pub(super) fn search_costs<S: Sum>(
         }
         let least = inside.iter().fold(i16::MAX, |least, &cost| least.min(cost));
         let place = candidates.start + inside.iter().position(|&cost| cost == least).unwrap_or(0);
-        let above = search.above(least);
+        let above = search.above(least, found.weak(i));
         let near = inside.iter().fold(0u16, |near, &cost| near + u16::from(cost < above));
         let at = |place: Option<usize>| place.and_then(|place| costs.get(place)).copied().unwrap_or(i16::MAX);
         found.put(i, place, [at(place.checked_sub(1)), least, at(Some(place + 1))], near, above);

@@ -27,7 +27,7 @@ use best::RightBest;
 use columns::Columns;
 use plan::Plan;
 use rows::Rows;
-use steps::{CheckBack, DecidePixels, PushRow, SlideEvidence};
+use steps::{CheckBack, DecidePixels, PushRow, SlideEvidence, SumEvidence};
 
 /// The matcher for pictures up to `WIDTH` wide and up to `DISPARITIES` disparities.
 ///
@@ -112,7 +112,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         self.settings = *settings;
         let backend = if self.is_forced { self.backend } else { Backend::fastest() };
         self.plan = Plan::new::<WIDTH, DISPARITIES>(backend, settings, width);
-        self.key_limits.fill(settings.uniqueness_percent);
+        self.key_limits.fill(settings.narrow_uniqueness_percent());
         self.width = width;
         self.height = height;
         self.begin();
@@ -210,8 +210,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             Window::Wide => settings.wide_window_width,
         };
         let uniqueness_percent = match window {
-            Window::Narrow => settings.uniqueness_percent,
-            Window::Wide => settings.wide_uniqueness_percent,
+            Window::Narrow => settings.narrow_uniqueness_percent(),
+            Window::Wide => [settings.wide_uniqueness_percent; 2],
         };
         let radius = usize::from(width) / 2;
         let margin = radius + settings.reach();
@@ -227,7 +227,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             min_texture: (u32::from(settings.texture) * area) >> 4,
             weak_texture: (u32::from(settings.weak_texture) * area) >> 4,
             max_saturated: area * u32::from(settings.saturated_percent) / 100,
-            unique: uniqueness_percent > 0,
+            unique: uniqueness_percent.map(|percent| percent > 0),
             only_weak: window == Window::Wide,
             keys: window == Window::Narrow && self.plan.keys,
         };
@@ -257,18 +257,15 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             search.follows = search.range.end == run.start && !search.range.is_empty();
             search.range = run.start..run.end.min(run.start + CHUNK);
             run.start = search.range.end;
+            let (sums, found) = (&mut self.sums, &mut self.found);
+            let evidence = self.columns.evidence();
+            let weak_texture = decide.weak_texture;
+            arch::compiled(self.plan.chosen, SumEvidence { search: &search, evidence, weak_texture, sums, found });
             self.search(&search, window);
             let chunk = search.range.clone();
             let (Some(out), Some(weak)) = (out.get_mut(chunk.clone()), self.weak.get_mut(chunk)) else { break };
-            let steps = DecidePixels {
-                decide: &decide,
-                search: &search,
-                found: &self.found,
-                evidence: self.columns.evidence(),
-                sums: &mut self.sums,
-                out,
-                weak,
-            };
+            let steps =
+                DecidePixels { decide: &decide, search: &search, found: &self.found, sums: &self.sums, out, weak };
             arch::compiled(self.plan.chosen, steps);
         }
         if settings.back_check && window == Window::Narrow {

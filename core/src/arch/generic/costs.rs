@@ -115,7 +115,7 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
             return;
         }
         let cost = least.least();
-        let above = search.above(cost);
+        let above = search.above(cost, found.weak(x - search.range.start));
         let bound = V::Wide::splat(above);
         let best = V::Wide::splat(cost);
         let mut near = V::Wide::splat(0);
@@ -171,7 +171,7 @@ unsafe fn cost_run<V: Vector, const BLOCKS: usize>(
             let key = least.least();
             let place = (key & 15) as usize * V::Wide::LANES + least.first_equal(V::Wide::splat(key));
             let best = (key >> 4).wrapping_add(i16::MIN);
-            let above = search.above(best);
+            let above = search.above(best, found.weak(x - search.range.start));
             let bound = V::Wide::splat(above);
             let mut near = V::Wide::splat(0);
             for half in 0..2 * BLOCKS {

@@ -116,7 +116,7 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
         }
         let least = least.least();
         let place = (least & 0x7f) as usize;
-        let above = limits.above(least);
+        let above = limits.above(least, found.weak(x - search.range.start));
         let bound = V::Wide::splat(above);
         let mut near = V::Wide::splat(0);
         for place in (0..stride).step_by(V::Wide::LANES) {
@@ -182,7 +182,7 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
             }
             let least = least.least();
             let place = (least & 0x7f) as usize;
-            let above = limits.above(least);
+            let above = limits.above(least, found.weak(x - search.range.start));
             let bound = V::Wide::splat(above);
             let mut near = V::Wide::splat(0);
             for block in 0..BLOCKS {
