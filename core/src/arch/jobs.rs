@@ -62,6 +62,30 @@ pub(crate) struct Right<'a> {
     pub(crate) lead: usize,
 }
 
+/// A search by keys of cost and place: for costs below 512 and places below 128.
+pub(crate) struct KeyJob<'a> {
+    pub(crate) search: &'a Search,
+    pub(crate) limits: &'a KeyLimits,
+    /// Sums over the rows of the window.
+    pub(crate) columns: &'a [u8],
+    /// Keys of the pixel at hand, from [`PAD`] on; those of the last one are still needed where the next job follows it.
+    pub(crate) work: &'a mut [i16],
+    pub(crate) right: Right<'a>,
+    pub(crate) found: &'a mut Found,
+}
+
+/// A search by costs, for sums whose window sums fit 16 bits.
+pub(crate) struct CostJob<'a, Sum> {
+    pub(crate) search: &'a Search,
+    /// Sums over the rows of the window.
+    pub(crate) columns: &'a [Sum],
+    /// Costs of the pixel at hand less 32768, from [`PAD`] on; as with keys.
+    pub(crate) work: &'a mut [i16],
+    /// `None` where the right pixels are not asked.
+    pub(crate) right: Option<Right<'a>>,
+    pub(crate) found: &'a mut Found,
+}
+
 /// The best place of each pixel that was searched for, and what is beside it. Nothing is said of pixels without candidates.
 ///
 /// Numbers are as the search has them: keys, or costs less 32768. What they mean is worked out for many pixels at a time.

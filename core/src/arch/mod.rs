@@ -33,7 +33,7 @@ mod plain;
 mod x86_64;
 
 pub(crate) use decide::{Decide, NO_PARTNER, Sums, back_check, evidence, refine};
-pub(crate) use jobs::{CHUNK, CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
+pub(crate) use jobs::{CHUNK, CodeRow, CostJob, Found, KeyJob, KeyLimits, PAD, Right, Search, SlideCodes};
 
 /// Whose instructions the inner loops are made of. All of them give the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -139,59 +139,33 @@ pub(crate) fn slide_grey(
     plain::slide_grey(columns, disparities, min_disparity, enter, leave);
 }
 
-/// The best places of up to [`CHUNK`] pixels of a row, from keys of cost and place: for costs below 512 and places below 128.
+/// The best places of up to [`CHUNK`] pixels of a row, from keys of cost and place.
 ///
 /// # Bound
 /// `pixels x disparities` steps, and as many for each column of the window where the sums are made afresh.
-pub(crate) fn search_keys(
-    chosen: Chosen,
-    search: &Search,
-    limits: &KeyLimits,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Right<'_>,
-    found: &mut Found,
-) {
+pub(crate) fn search_keys(chosen: Chosen, job: KeyJob<'_>) {
     match chosen.0 {
         #[cfg(target_arch = "x86_64")]
-        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
-            x86_64::search_keys(chosen, search, limits, columns, work, right, found);
-        }
-        _ => plain::search_keys(search, limits, columns, work, right, found),
+        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => x86_64::search_keys(chosen, job),
+        _ => plain::search_keys(job),
     }
 }
 
-/// The best places of up to [`CHUNK`] pixels of a row, for sums of bytes whose window sums fit 16 bits. `right` is `None` where
-/// the right pixels are not asked.
+/// The best places of up to [`CHUNK`] pixels of a row, for sums of bytes.
 ///
 /// # Bound
 /// That of [`search_keys`], twice.
-pub(crate) fn search_bytes(
-    chosen: Chosen,
-    search: &Search,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Option<Right<'_>>,
-    found: &mut Found,
-) {
+pub(crate) fn search_bytes(chosen: Chosen, job: CostJob<'_, u8>) {
     match chosen.0 {
         #[cfg(target_arch = "x86_64")]
-        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
-            x86_64::search_costs(chosen, search, columns, work, right, found);
-        }
-        _ => plain::search_costs(search, columns, work, right, found),
+        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => x86_64::search_costs(chosen, job),
+        _ => plain::search_costs(job),
     }
 }
 
 /// As [`search_bytes`], for sums of 16 bits.
-pub(crate) fn search_words(
-    search: &Search,
-    columns: &[[u8; 2]],
-    work: &mut [i16],
-    right: Option<Right<'_>>,
-    found: &mut Found,
-) {
-    plain::search_costs(search, columns, work, right, found);
+pub(crate) fn search_words(job: CostJob<'_, [u8; 2]>) {
+    plain::search_costs(job);
 }
 
 /// Steps in plain Rust that are compiled for the chosen backend. `run`, and what it calls, is to be `inline(always)`: that is why

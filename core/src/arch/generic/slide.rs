@@ -1,6 +1,6 @@
 //! A row of codes into the sums of its columns, and another one out.
 
-use super::{Vector, mask};
+use super::{Vector, by_blocks, mask};
 use crate::arch::jobs::{CodeRow, SlideCodes};
 
 /// # Safety
@@ -25,15 +25,10 @@ pub(in crate::arch) unsafe fn slide_codes<V: Vector>(job: SlideCodes<'_>) {
     unsafe {
         let sizes = [width, stride, disparities, back];
         let Some(leave) = leave else { return slide::<V, false, 0>(columns, sizes, enter, enter) };
-        match stride / V::LANES {
-            1 => slide::<V, true, 1>(columns, sizes, enter, leave),
-            2 => slide::<V, true, 2>(columns, sizes, enter, leave),
-            3 => slide::<V, true, 3>(columns, sizes, enter, leave),
-            4 => slide::<V, true, 4>(columns, sizes, enter, leave),
-            6 => slide::<V, true, 6>(columns, sizes, enter, leave),
-            8 => slide::<V, true, 8>(columns, sizes, enter, leave),
-            _ => slide::<V, true, 0>(columns, sizes, enter, leave),
-        }
+        by_blocks!(stride / V::LANES,
+            BLOCKS => slide::<V, true, BLOCKS>(columns, sizes, enter, leave),
+            _ => slide::<V, true, 0>(columns, sizes, enter, leave)
+        );
     }
 }
 

@@ -8,7 +8,7 @@ use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
 use super::{
     Backend, Chosen, Steps, generic,
-    jobs::{Found, KeyLimits, Right, Search, SlideCodes},
+    jobs::{CostJob, KeyJob, SlideCodes},
 };
 use avx2::Avx2;
 use sse2::Sse2;
@@ -57,88 +57,64 @@ fn saved_registers() -> u64 {
     unsafe { ask() }
 }
 
+/// The algorithm with a vector, compiled for its instructions.
 macro_rules! functions {
-    ($slide:ident, $keys:ident, $costs:ident, $vector:ty, $features:literal) => {
-        #[target_feature(enable = $features)]
-        fn $slide(job: SlideCodes<'_>) {
-            // SAFETY: this function is only called where the instructions are.
-            unsafe { generic::slide_codes::<$vector>(job) }
-        }
+    ($name:ident, $vector:ty, $features:literal) => {
+        mod $name {
+            use super::*;
 
-        #[target_feature(enable = $features)]
-        fn $keys(
-            search: &Search,
-            limits: &KeyLimits,
-            columns: &[u8],
-            work: &mut [i16],
-            right: Right<'_>,
-            found: &mut Found,
-        ) {
-            // SAFETY: this function is only called where the instructions are.
-            unsafe { generic::search_keys::<$vector>(search, limits, columns, work, right, found) }
-        }
+            #[target_feature(enable = $features)]
+            pub(super) fn slide_codes(job: SlideCodes<'_>) {
+                // SAFETY: this function is only called where the instructions are.
+                unsafe { generic::slide_codes::<$vector>(job) }
+            }
 
-        #[target_feature(enable = $features)]
-        fn $costs(search: &Search, columns: &[u8], work: &mut [i16], right: Option<Right<'_>>, found: &mut Found) {
-            // SAFETY: this function is only called where the instructions are.
-            unsafe { generic::search_costs::<$vector>(search, columns, work, right, found) }
+            #[target_feature(enable = $features)]
+            pub(super) fn search_keys(job: KeyJob<'_>) {
+                // SAFETY: this function is only called where the instructions are.
+                unsafe { generic::search_keys::<$vector>(job) }
+            }
+
+            #[target_feature(enable = $features)]
+            pub(super) fn search_costs(job: CostJob<'_, u8>) {
+                // SAFETY: this function is only called where the instructions are.
+                unsafe { generic::search_costs::<$vector>(job) }
+            }
         }
     };
 }
 
-functions!(slide_sse2, keys_sse2, costs_sse2, Sse2, "sse2");
-functions!(slide_sse41, keys_sse41, costs_sse41, Sse41, "ssse3,sse4.1");
-functions!(slide_avx2, keys_avx2, costs_avx2, Avx2, "avx2,bmi1,bmi2");
+functions!(with_sse2, Sse2, "sse2");
+functions!(with_sse41, Sse41, "ssse3,sse4.1");
+functions!(with_avx2, Avx2, "avx2,bmi1,bmi2");
+
+/// Calls the function of the chosen backend.
+macro_rules! call {
+    ($chosen:expr, $function:ident($job:expr)) => {
+        // SAFETY: `Chosen` holds only a backend whose instructions the processor was found to have.
+        unsafe {
+            match $chosen.backend() {
+                Backend::Avx2 => with_avx2::$function($job),
+                Backend::Sse41 => with_sse41::$function($job),
+                _ => with_sse2::$function($job),
+            }
+        }
+    };
+}
 
 /// Lets a row of codes in and another one out.
 pub(super) fn slide_codes(chosen: Chosen, job: SlideCodes<'_>) {
-    // SAFETY: `Chosen` holds only a backend whose instructions the processor was found to have.
-    unsafe {
-        match chosen.backend() {
-            Backend::Avx2 => slide_avx2(job),
-            Backend::Sse41 => slide_sse41(job),
-            Backend::Plain | Backend::Sse2 => slide_sse2(job),
-        }
-    }
+    call!(chosen, slide_codes(job));
 }
 
 /// Searches by keys.
-pub(super) fn search_keys(
-    chosen: Chosen,
-    search: &Search,
-    limits: &KeyLimits,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Right<'_>,
-    found: &mut Found,
-) {
-    // SAFETY: as in `slide_codes`.
-    unsafe {
-        match chosen.backend() {
-            Backend::Avx2 => keys_avx2(search, limits, columns, work, right, found),
-            Backend::Sse41 => keys_sse41(search, limits, columns, work, right, found),
-            Backend::Plain | Backend::Sse2 => keys_sse2(search, limits, columns, work, right, found),
-        }
-    }
+pub(super) fn search_keys(chosen: Chosen, job: KeyJob<'_>) {
+    call!(chosen, search_keys(job));
 }
 
 /// Searches by costs.
-pub(super) fn search_costs(
-    chosen: Chosen,
-    search: &Search,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Option<Right<'_>>,
-    found: &mut Found,
-) {
-    // SAFETY: as in `slide_codes`.
-    unsafe {
-        match chosen.backend() {
-            Backend::Avx2 => costs_avx2(search, columns, work, right, found),
-            Backend::Sse41 => costs_sse41(search, columns, work, right, found),
-            Backend::Plain | Backend::Sse2 => costs_sse2(search, columns, work, right, found),
-        }
-    }
+pub(super) fn search_costs(chosen: Chosen, job: CostJob<'_, u8>) {
+    call!(chosen, search_costs(job));
 }
 
 /// Runs steps with the instructions that were chosen: plain Rust, of which the compiler makes vectors.
@@ -149,7 +125,7 @@ pub(super) fn compiled(chosen: Chosen, steps: impl Steps) {
         steps.run();
     }
     match chosen.backend() {
-        // SAFETY: as in `slide_codes`.
+        // SAFETY: `Chosen` holds only a backend whose instructions the processor was found to have.
         Backend::Avx2 => unsafe { with_avx2(steps) },
         _ => steps.run(),
     }
