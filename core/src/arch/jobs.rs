@@ -15,7 +15,10 @@ pub(crate) struct CodeRow<'a> {
     /// Right codes, or their lower four bits where the backend splits them; pixel `x` at `lead + x`.
     pub(crate) low: &'a [u8],
     /// Upper four bits, where the backend splits codes; pixel `x` at `lead + x`.
-    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "no backend here splits codes"))]
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))),
+        expect(dead_code, reason = "plain Rust does not split codes")
+    )]
     pub(crate) high: &'a [u8],
     /// Bytes in front of the first pixel that may be read and mean nothing.
     pub(crate) lead: usize,
@@ -49,7 +52,10 @@ pub(crate) struct Search {
     pub(crate) right_end: usize,
     pub(crate) uniqueness_percent: u16,
     /// Whether no cost is above 2040 and no sum of a column above 127.
-    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "plain Rust has one way for all costs"))]
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))),
+        expect(dead_code, reason = "plain Rust has one way for all costs")
+    )]
     pub(crate) is_small: bool,
 }
 
@@ -169,7 +175,7 @@ impl Search {
     }
 
     /// Pixels that have all candidates, within `range`.
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
     pub(crate) fn inner(&self) -> Range<usize> {
         let first = self.right_first + self.min_disparity + self.disparities - 1;
         let end = if self.right_first < self.right_end { self.right_end + self.min_disparity } else { 0 };

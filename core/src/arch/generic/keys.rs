@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use super::{PLACES, Vector, Wide, by_blocks, is_outside, outside_is_nothing, search_fits};
+use super::{PLACES, Vector, Wide, by_blocks, outside_is_nothing, search_fits};
 use crate::arch::jobs::{Found, KeyJob, KeyLimits, PAD, Search};
 
 /// # Safety
@@ -51,8 +51,7 @@ unsafe fn begin_keys<V: Vector>(search: &Search, columns: &[u8], keys: *mut i16)
             let mut sums = [places, places.add(V::Wide::splat(V::Wide::LANES as i16))];
             let inside = [end.greater(sums[0]), end.greater(sums[1])];
             for x in search.range.start - search.radius - 1..search.range.start + search.radius {
-                let [low, high] = V::load(columns.as_ptr().add(x * search.stride + first)).widen_shifted();
-                sums = [sums[0].add(low), sums[1].add(high)];
+                sums = V::load(columns.as_ptr().add(x * search.stride + first)).add_shifted(sums);
             }
             for half in 0..2 {
                 sums[half].select(inside[half], nothing).store(keys.add(first + half * V::Wide::LANES));
@@ -82,33 +81,31 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
         let nothing = V::Wide::splat(i16::MAX);
         let turn = V::Wide::splat(0x7f);
         let table = tables[x % 2].add(x);
-        let mut least = nothing;
         for first in (0..stride).step_by(V::LANES) {
-            let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_shifted();
-            for half in 0..2 {
-                let place = first + half * V::Wide::LANES;
-                let key = V::Wide::load(keys.add(place)).add(change[half]);
-                key.store(keys.add(place));
-                if BORDER && is_outside::<V>(place, &candidates) {
-                    continue;
-                }
-                let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
-                least = least.min(key);
-                V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
-            }
+            let change = V::load(enter.add(first)).sub(V::load(leave.add(first)));
+            let before = [V::Wide::load(keys.add(first)), V::Wide::load(keys.add(first + V::Wide::LANES))];
+            let after = change.add_shifted(before);
+            after[0].store(keys.add(first));
+            after[1].store(keys.add(first + V::Wide::LANES));
         }
         if BORDER && candidates.is_empty() {
             return;
+        }
+        // Vectors without candidates are passed over.
+        let places = candidates.start / V::Wide::LANES * V::Wide::LANES..if BORDER { candidates.end } else { stride };
+        let mut least = nothing;
+        for place in places.clone().step_by(V::Wide::LANES) {
+            let key = V::Wide::load(keys.add(place));
+            let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
+            least = least.min(key);
+            V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
         }
         let least = least.least();
         let place = (least & 0x7f) as usize;
         let above = limits.above(least);
         let bound = V::Wide::splat(above);
         let mut near = V::Wide::none();
-        for place in (0..stride).step_by(V::Wide::LANES) {
-            if BORDER && is_outside::<V>(place, &candidates) {
-                continue;
-            }
+        for place in places.step_by(V::Wide::LANES) {
             let key = V::Wide::load(keys.add(place));
             let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
             near = V::Wide::count(near, bound.greater(key));
@@ -152,19 +149,21 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
             let table = tables[x % 2].add(x);
             let mut least = V::Wide::splat(i16::MAX);
             for block in 0..BLOCKS {
-                let first = block * V::LANES;
-                let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_shifted();
-                for half in 0..2 {
-                    let place = first + half * V::Wide::LANES;
-                    let before = if kept { current[block][half] } else { V::Wide::load(keys.add(place)) };
-                    let key = before.add(change[half]);
-                    if kept {
-                        current[block][half] = key;
-                    }
-                    key.store(keys.add(place));
-                    least = least.min(key);
-                    V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
+                let (first, second) = (block * V::LANES, block * V::LANES + V::Wide::LANES);
+                if !kept {
+                    current[block] = [V::Wide::load(keys.add(first)), V::Wide::load(keys.add(second))];
                 }
+                let change = V::load(enter.add(first)).sub(V::load(leave.add(first)));
+                // What belongs together is read and written together: two vectors in one instruction, where there is one.
+                let [low, high] = change.add_shifted(current[block]);
+                let offered = [V::Wide::load(table.add(first)), V::Wide::load(table.add(second))];
+                current[block] = [low, high];
+                low.store(keys.add(first));
+                high.store(keys.add(second));
+                least = least.min(low.min(high));
+                let best = [offered[0].min(low.xor(turn)), offered[1].min(high.xor(turn))];
+                best[0].store(table.add(first));
+                best[1].store(table.add(second));
             }
             let least = least.least();
             let place = (least & 0x7f) as usize;

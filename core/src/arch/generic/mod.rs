@@ -41,8 +41,8 @@ pub(super) trait Vector: Copy {
     unsafe fn widen(self) -> [Self::Wide; 2];
     /// Numbers with a sign, in order.
     unsafe fn widen_signed(self) -> [Self::Wide; 2];
-    /// 128 times numbers with a sign, in order.
-    unsafe fn widen_shifted(self) -> [Self::Wide; 2];
+    /// Adds 128 times these numbers, with a sign, to others, in order.
+    unsafe fn add_shifted(self, to: [Self::Wide; 2]) -> [Self::Wide; 2];
 }
 
 /// A vector of 16-bit numbers with a sign.

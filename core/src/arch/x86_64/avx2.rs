@@ -62,14 +62,11 @@ impl Vector for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn widen_shifted(self) -> [Words16; 2] {
+    unsafe fn add_shifted(self, to: [Words16; 2]) -> [Words16; 2] {
         // SAFETY: the caller guarantees the instructions.
         unsafe {
-            let halves = [_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0)];
-            [
-                Words16(_mm256_slli_epi16::<7>(_mm256_cvtepi8_epi16(halves[0]))),
-                Words16(_mm256_slli_epi16::<7>(_mm256_cvtepi8_epi16(halves[1]))),
-            ]
+            let [Words16(low), Words16(high)] = self.widen_signed();
+            [to[0].add(Words16(_mm256_slli_epi16::<7>(low))), to[1].add(Words16(_mm256_slli_epi16::<7>(high)))]
         }
     }
 }

@@ -1,6 +1,7 @@
 //! x86-64: what the processor has, and the functions that are compiled for it.
 
 mod avx2;
+mod avx512;
 mod sse2;
 mod sse41;
 
@@ -11,34 +12,42 @@ use super::{
     jobs::{CostJob, KeyJob, SlideCodes},
 };
 use avx2::Avx2;
+use avx512::Avx512;
 use sse2::Sse2;
 use sse41::Sse41;
 
 /// Asks the processor, and of wide registers whether the operating system keeps them.
 ///
-/// Source: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 1, sections 14.3 and 14.7.1.
+/// Source: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 1, sections 14.3, 14.7.1 and 15.2.
 pub(super) fn is_available(backend: Backend) -> bool {
     match backend {
         Backend::Plain | Backend::Sse2 => true,
-        Backend::Sse41 => {
-            let (_, features) = features();
-            has(features, 9) && has(features, 19)
-        }
-        Backend::Avx2 => {
-            let (highest, features) = features();
-            let [saves, avx] = [27, 28].map(|bit| has(features, bit));
-            // Registers 1 and 2 of those that the system saves: the lower and upper halves.
-            highest >= 7 && saves && avx && saved_registers() & 6 == 6 && {
-                let features = __cpuid_count(7, 0).ebx;
-                // AVX2, and BMI1 and BMI2, which came with it.
-                [5, 3, 8].into_iter().all(|bit| has(features, bit))
+        Backend::Sse41 => all(features().1, [9, 19]),
+        Backend::Avx2 => has_avx2(),
+        Backend::Avx512 => {
+            // The masks, and the upper halves and the second half of the wide registers; F16C, FMA and POPCNT, which came before.
+            has_avx2() && saved_registers() & 0xe0 == 0xe0 && all(features().1, [29, 12, 23]) && {
+                let features = __cpuid_count(7, 0);
+                // AVX512F, BW and VL; BITALG.
+                all(features.ebx, [16, 30, 31]) && all(features.ecx, [12])
             }
         }
+        _ => false,
     }
 }
 
-const fn has(features: u32, bit: u32) -> bool {
-    features >> bit & 1 == 1
+fn has_avx2() -> bool {
+    let (highest, features) = features();
+    // OSXSAVE and AVX; registers 1 and 2 of those that the system saves: the lower and upper halves.
+    highest >= 7 && all(features, [27, 28]) && saved_registers() & 6 == 6 && {
+        // AVX2, and BMI1 and BMI2, which came with it.
+        all(__cpuid_count(7, 0).ebx, [5, 3, 8])
+    }
+}
+
+/// Whether all of these bits are set.
+fn all<const N: usize>(features: u32, bits: [u32; N]) -> bool {
+    bits.into_iter().all(|bit| features >> bit & 1 == 1)
 }
 
 /// The highest leaf, and the features of leaf 1.
@@ -87,6 +96,7 @@ macro_rules! functions {
 functions!(with_sse2, Sse2, "sse2");
 functions!(with_sse41, Sse41, "ssse3,sse4.1");
 functions!(with_avx2, Avx2, "avx2,bmi1,bmi2");
+functions!(with_avx512, Avx512, "avx512f,avx512bw,avx512vl,avx512bitalg,bmi1,bmi2,popcnt");
 
 /// Calls the function of the chosen backend.
 macro_rules! call {
@@ -94,6 +104,7 @@ macro_rules! call {
         // SAFETY: `Chosen` holds only a backend whose instructions the processor was found to have.
         unsafe {
             match $chosen.backend() {
+                Backend::Avx512 => with_avx512::$function($job),
                 Backend::Avx2 => with_avx2::$function($job),
                 Backend::Sse41 => with_sse41::$function($job),
                 _ => with_sse2::$function($job),
@@ -120,12 +131,18 @@ pub(super) fn search_costs(chosen: Chosen, job: CostJob<'_, u8>) {
 /// Runs steps with the instructions that were chosen: plain Rust, of which the compiler makes vectors.
 #[inline(always)]
 pub(super) fn compiled(chosen: Chosen, steps: impl Steps) {
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,bmi1,bmi2")]
+    fn with_avx512(steps: impl Steps) {
+        steps.run();
+    }
     #[target_feature(enable = "avx2,bmi1,bmi2")]
     fn with_avx2(steps: impl Steps) {
         steps.run();
     }
     match chosen.backend() {
         // SAFETY: `Chosen` holds only a backend whose instructions the processor was found to have.
+        Backend::Avx512 => unsafe { with_avx512(steps) },
+        // SAFETY: as above.
         Backend::Avx2 => unsafe { with_avx2(steps) },
         _ => steps.run(),
     }

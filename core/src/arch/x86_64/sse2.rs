@@ -42,12 +42,12 @@ macro_rules! sixteen_bytes {
 
         /// A byte in the upper half is 256 times the number.
         #[inline(always)]
-        unsafe fn widen_shifted(self) -> [$words; 2] {
+        unsafe fn add_shifted(self, to: [$words; 2]) -> [$words; 2] {
             // SAFETY: the caller guarantees the instructions.
             unsafe {
                 let zero = _mm_setzero_si128();
                 let [low, high] = [_mm_unpacklo_epi8(zero, self.0), _mm_unpackhi_epi8(zero, self.0)];
-                [$words(_mm_srai_epi16::<1>(low)), $words(_mm_srai_epi16::<1>(high))]
+                [to[0].add($words(_mm_srai_epi16::<1>(low))), to[1].add($words(_mm_srai_epi16::<1>(high)))]
             }
         }
     };
