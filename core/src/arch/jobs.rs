@@ -15,7 +15,10 @@ pub(crate) struct CodeRow<'a> {
     /// Right codes, or their lower four bits where the backend splits them; pixel `x` at `lead + x`.
     pub(crate) low: &'a [u8],
     /// Upper four bits, where the backend splits codes; pixel `x` at `lead + x`.
-    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "no backend here splits codes"))]
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))),
+        expect(dead_code, reason = "plain Rust does not split codes")
+    )]
     pub(crate) high: &'a [u8],
     /// Bytes in front of the first pixel that may be read and mean nothing.
     pub(crate) lead: usize,
@@ -50,7 +53,10 @@ pub(crate) struct Search {
     /// How much better than any other a place must be: where there is texture, and where it is weak.
     pub(crate) uniqueness_percent: [u16; 2],
     /// Whether no cost is above 2040 and no sum of a column above 127.
-    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "plain Rust has one way for all costs"))]
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))),
+        expect(dead_code, reason = "plain Rust has one way for all costs")
+    )]
     pub(crate) is_small: bool,
 }
 
@@ -61,6 +67,30 @@ pub(crate) struct Search {
 pub(crate) struct Right<'a> {
     pub(crate) tables: [&'a mut [i16]; 2],
     pub(crate) lead: usize,
+}
+
+/// A search by keys of cost and place: for costs below 512 and places below 128.
+pub(crate) struct KeyJob<'a> {
+    pub(crate) search: &'a Search,
+    pub(crate) limits: &'a KeyLimits,
+    /// Sums over the rows of the window.
+    pub(crate) columns: &'a [u8],
+    /// Keys of the pixel at hand, from [`PAD`] on; those of the last one are still needed where the next job follows it.
+    pub(crate) work: &'a mut [i16],
+    pub(crate) right: Right<'a>,
+    pub(crate) found: &'a mut Found,
+}
+
+/// A search by costs, for sums whose window sums fit 16 bits.
+pub(crate) struct CostJob<'a, Sum> {
+    pub(crate) search: &'a Search,
+    /// Sums over the rows of the window.
+    pub(crate) columns: &'a [Sum],
+    /// Costs of the pixel at hand less 32768, from [`PAD`] on; as with keys.
+    pub(crate) work: &'a mut [i16],
+    /// `None` where the right pixels are not asked.
+    pub(crate) right: Option<Right<'a>>,
+    pub(crate) found: &'a mut Found,
 }
 
 /// The best place of each pixel that was searched for, and what is beside it. Nothing is said of pixels without candidates.
@@ -166,7 +196,7 @@ impl Search {
     }
 
     /// Pixels that have all candidates, within `range`.
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
     pub(crate) fn inner(&self) -> Range<usize> {
         let first = self.right_first + self.min_disparity + self.disparities - 1;
         let end = if self.right_first < self.right_end { self.right_end + self.min_disparity } else { 0 };

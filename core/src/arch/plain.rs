@@ -1,6 +1,6 @@
 //! Plain Rust: what every other backend is held against.
 
-use super::jobs::{CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
+use super::jobs::{CodeRow, CostJob, KeyJob, PAD, SlideCodes};
 
 /// A sum over the rows of a window as it lies in a column.
 pub(super) trait Sum: Copy {
@@ -84,14 +84,8 @@ fn slide<S: Copy>(
     }
 }
 
-pub(super) fn search_keys(
-    search: &Search,
-    limits: &KeyLimits,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Right<'_>,
-    found: &mut Found,
-) {
+pub(super) fn search_keys(job: KeyJob<'_>) {
+    let KeyJob { search, limits, columns, work, right, found } = job;
     let disparities = search.disparities;
     let Some(keys) = work.get_mut(PAD..PAD + disparities) else { return };
     let column =
@@ -130,13 +124,8 @@ pub(super) fn search_keys(
 }
 
 /// Costs are kept less 32768, because some processors compare signed numbers only.
-pub(super) fn search_costs<S: Sum>(
-    search: &Search,
-    columns: &[S],
-    work: &mut [i16],
-    mut right: Option<Right<'_>>,
-    found: &mut Found,
-) {
+pub(super) fn search_costs<S: Sum>(job: CostJob<'_, S>) {
+    let CostJob { search, columns, work, mut right, found } = job;
     let disparities = search.disparities;
     let Some(costs) = work.get_mut(PAD..PAD + disparities) else { return };
     let column =

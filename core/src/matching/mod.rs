@@ -19,7 +19,7 @@ pub use settings::{MatchCost, MatchSettings, Prefilter};
 pub(crate) use strip::Strip;
 
 use crate::{
-    arch::{self, Backend, CHUNK, Decide, Found, KeyLimits, Search, Sums},
+    arch::{self, Backend, CHUNK, CostJob, Decide, Found, KeyJob, KeyLimits, Search, Sums},
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
 };
@@ -301,14 +301,16 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         let lent = right.lend(plan.lead);
         match (self.settings.cost, window) {
             (MatchCost::Census, Window::Narrow) if plan.keys => {
-                arch::search_keys(plan.chosen, search, &self.key_limits, columns.bytes(), work, lent, found);
+                let (limits, columns) = (&self.key_limits, columns.bytes());
+                arch::search_keys(plan.chosen, KeyJob { search, limits, columns, work, right: lent, found });
             }
             (MatchCost::Census, _) => {
-                let right = (window == Window::Narrow).then_some(lent);
-                arch::search_bytes(plan.chosen, search, columns.bytes(), work, right, found);
+                let (columns, right) = (columns.bytes(), (window == Window::Narrow).then_some(lent));
+                arch::search_bytes(plan.chosen, CostJob { search, columns, work, right, found });
             }
             (MatchCost::AbsoluteDifferences, _) => {
-                arch::search_words(search, columns.words(), work, (window == Window::Narrow).then_some(lent), found);
+                let (columns, right) = (columns.words(), (window == Window::Narrow).then_some(lent));
+                arch::search_words(CostJob { search, columns, work, right, found });
             }
         }
     }
