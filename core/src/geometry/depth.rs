@@ -71,6 +71,20 @@ impl<const DISPARITIES: usize> DepthTable<DISPARITIES> {
         self.inverse(steps) as f32 * self.scale_m
     }
 
+    /// [`Self::distance_m`] of pixels side by side that all are [`Self::covered`]; of others it gives any of the distances.
+    #[inline(always)]
+    pub(crate) fn distances_m<const N: usize>(&self, steps: &[u16; N]) -> [f32; N] {
+        let entries = self.inverse.as_flattened();
+        let mut inverse = [0; N];
+        for k in 0..N {
+            // Of a known range, so that it is not checked once more.
+            let place = usize::from(steps[k].wrapping_sub(self.base_steps)).min((16 * DISPARITIES).saturating_sub(1));
+            inverse[k] = entries.get(place).copied().unwrap_or(0);
+        }
+        // Below 2^31: signed numbers are what vector instructions turn into floating point.
+        core::array::from_fn(|k| inverse[k] as i32 as f32 * self.scale_m)
+    }
+
     /// Focal length times baseline, px m: the distance at a disparity of 1 px.
     pub fn focal_baseline_px_m(&self) -> f32 {
         self.scale_m * (INVERSE_ONE / 16.0)

@@ -212,13 +212,36 @@ impl Terrain {
 
     /// How far the ground lies above the plane `x_m` ahead and `y_m` to the left, metres.
     pub fn lift_m(&self, x_m: f32, y_m: f32) -> f32 {
-        let [ahead, across] = self.place(x_m, y_m);
-        let ahead = (ahead - 0.5).clamp(0.0, (AHEAD - 1) as f32);
-        let across = (across - 0.5).clamp(0.0, (ACROSS - 1) as f32);
-        let (i, j) = ((ahead as usize).min(AHEAD - 2), (across as usize).min(ACROSS - 2));
-        let (s, t) = (ahead - i as f32, across - j as f32);
-        let [near, far] = [self.lift_m[i], self.lift_m[i + 1]].map(|row| row[j] + t * (row[j + 1] - row[j]));
-        near + s * (far - near)
+        let [lift_m] = self.lifts_m(&[x_m], &[y_m]);
+        lift_m
+    }
+
+    /// [`Self::lift_m`] of several places side by side.
+    #[inline(always)]
+    pub(crate) fn lifts_m<const N: usize>(&self, x_m: &[f32; N], y_m: &[f32; N]) -> [f32; N] {
+        let (mut corners, mut parts) = ([0; N], [[0.0; 2]; N]);
+        for k in 0..N {
+            let [ahead, across] = self.place(x_m[k], y_m[k]);
+            let ahead = (ahead - 0.5).clamp(0.0, (AHEAD - 1) as f32);
+            let across = (across - 0.5).clamp(0.0, (ACROSS - 1) as f32);
+            let (i, j) = ((ahead as i32).min(AHEAD as i32 - 2), (across as i32).min(ACROSS as i32 - 2));
+            parts[k] = [ahead - i as f32, across - j as f32];
+            corners[k] = i * ACROSS as i32 + j;
+        }
+        // The four patches around each place, one after the other: no vector instruction of all processors does it.
+        let lift_m = self.lift_m.as_flattened();
+        let mut around = [[0.0; N]; 4];
+        for k in 0..N {
+            let corner = (corners[k] as usize).min((AHEAD - 1) * ACROSS - 2);
+            for (patches, offset) in around.iter_mut().zip([0, 1, ACROSS, ACROSS + 1]) {
+                patches[k] = lift_m.get(corner + offset).copied().unwrap_or(0.0);
+            }
+        }
+        core::array::from_fn(|k| {
+            let ([s, t], [a, b, c, d]) = (parts[k], [around[0][k], around[1][k], around[2][k], around[3][k]]);
+            let (near, far) = (a + t * (b - a), c + t * (d - c));
+            near + s * (far - near)
+        })
     }
 
     /// Height of a point of the vehicle frame above the ground, metres.
@@ -227,6 +250,7 @@ impl Terrain {
     }
 
     /// Where a point lies, in patches from the nearest and from the rightmost one.
+    #[inline(always)]
     fn place(&self, x_m: f32, y_m: f32) -> [f32; 2] {
         [x_m / self.patch_m, y_m / self.patch_m + (ACROSS / 2) as f32]
     }

@@ -20,8 +20,8 @@ use crate::{
     planes::Scatter,
 };
 use moments::{Moments, RowMoments};
-pub(crate) use tile::CODES;
 use tile::{CODE_SHIFT, MAX_SURFACES, NUMBER_MASK, Tile, TileUnion};
+pub(crate) use tile::{CODES, MAX_SURFACES as MAX_TILE_SURFACES};
 
 /// Edge of a tile, px. The paper, section 4.4.
 pub const TILE: usize = 32;
@@ -242,10 +242,12 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         &self.labels[y * self.width..(y + 1) * self.width]
     }
 
-    /// Place in the table of the first surface of the tile at `(x, y)`.
-    pub(crate) fn first_of_tile(&self, x: usize, y: usize) -> usize {
+    /// The surfaces of the tile at `(x, y)`, in the order of their numbers.
+    pub(crate) fn of_tile(&self, x: usize, y: usize) -> &[Surface] {
         let tile = y / TILE * self.width.div_ceil(TILE) + x / TILE;
-        self.tiles.get(tile).map_or(0, |&first| usize::from(first))
+        let Some(&first) = self.tiles.get(tile) else { return &[] };
+        let end = self.tiles.get(tile + 1).map_or(self.table.len(), |&end| usize::from(end));
+        self.table.get(usize::from(first)..end).unwrap_or_default()
     }
 
     /// Width and height of the pictures.

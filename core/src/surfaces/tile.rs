@@ -17,7 +17,7 @@ const AREA: usize = TILE * TILE;
 pub(super) const MIN_PIXELS: u16 = 16;
 
 /// Most surfaces that one tile can hold.
-pub(super) const MAX_SURFACES: usize = AREA / MIN_PIXELS as usize;
+pub(crate) const MAX_SURFACES: usize = AREA / MIN_PIXELS as usize;
 
 /// Number of classes that a method can tell pixels apart by, before there are surfaces: two bits beside the number of a surface.
 pub(crate) const CODES: usize = 4;
