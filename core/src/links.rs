@@ -60,22 +60,26 @@ pub(crate) fn piece(row: &[DisparityPixel], x: usize) -> Piece {
 }
 
 /// Where `piece` lies within `values`.
+#[inline(always)]
 fn within(piece: &Piece, values: &Range<u16>) -> u32 {
     let span = values.end.saturating_sub(values.start);
     bits(core::array::from_fn(|i| u8::from(piece[i].wrapping_sub(values.start) < span)))
 }
 
 /// Where two pieces differ by no more than `step`.
+#[inline(always)]
 pub(crate) fn near(a: &Piece, b: &Piece, step: u16) -> u32 {
     bits(core::array::from_fn(|i| u8::from(a[i].abs_diff(b[i]) <= step)))
 }
 
 /// Where two rows of bytes are the same.
+#[inline(always)]
 pub(crate) fn same(a: &[u8; PIECE], b: &[u8; PIECE]) -> u32 {
     bits(core::array::from_fn(|i| u8::from(a[i] == b[i])))
 }
 
 /// Bytes that are 0 or 1 as bits, the first in the lowest one.
+#[inline(always)]
 fn bits(flags: [u8; PIECE]) -> u32 {
     // The product brings the lowest bits of eight bytes side by side into its highest byte.
     const GATHER: u64 = 0x0102_0408_1020_4080;

@@ -4,6 +4,7 @@ use super::GroundPlane;
 use crate::{
     disparity::DisparityPicture,
     geometry::{DepthTable, Rays},
+    lanes::floor,
     surfaces::{SurfaceClass, Surfaces},
 };
 
@@ -222,9 +223,9 @@ impl Terrain {
         let (mut corners, mut parts) = ([0; N], [[0.0; 2]; N]);
         for k in 0..N {
             let [ahead, across] = self.place(x_m[k], y_m[k]);
-            let ahead = (ahead - 0.5).clamp(0.0, (AHEAD - 1) as f32);
-            let across = (across - 0.5).clamp(0.0, (ACROSS - 1) as f32);
-            let (i, j) = ((ahead as i32).min(AHEAD as i32 - 2), (across as i32).min(ACROSS as i32 - 2));
+            let (most_ahead, most_across) = ((AHEAD - 1) as f32, (ACROSS - 1) as f32);
+            let (ahead, across) = ((ahead - 0.5).clamp(0.0, most_ahead), (across - 0.5).clamp(0.0, most_across));
+            let (i, j) = (floor(ahead, 0.0, most_ahead - 1.0), floor(across, 0.0, most_across - 1.0));
             parts[k] = [ahead - i as f32, across - j as f32];
             corners[k] = i * ACROSS as i32 + j;
         }
@@ -237,11 +238,13 @@ impl Terrain {
                 patches[k] = lift_m.get(corner + offset).copied().unwrap_or(0.0);
             }
         }
-        core::array::from_fn(|k| {
+        let mut lifts_m = [0.0; N];
+        for k in 0..N {
             let ([s, t], [a, b, c, d]) = (parts[k], [around[0][k], around[1][k], around[2][k], around[3][k]]);
             let (near, far) = (a + t * (b - a), c + t * (d - c));
-            near + s * (far - near)
-        })
+            lifts_m[k] = near + s * (far - near);
+        }
+        lifts_m
     }
 
     /// Height of a point of the vehicle frame above the ground, metres.

@@ -79,7 +79,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             settings: MapSettings::UNSET,
             obstacle_heights_m: (0.0, 0.0),
             evidence: [NOTHING; CELLS],
-            common: [Common::NOTHING; MAX_TILE_SURFACES],
+            common: [Common::UNSET; MAX_TILE_SURFACES],
             chosen: Chosen::PLAIN,
         }
     }

@@ -5,6 +5,7 @@ use crate::{
     arch::Steps,
     disparity::DisparityPicture,
     ground::Terrain,
+    lanes::floor,
     links::{PIECE, Piece, each_bit, near, same},
     surfaces::{MAX_TILE_SURFACES, Surface, SurfaceClass, Surfaces, TILE},
 };
@@ -18,15 +19,20 @@ const LANES: usize = 8;
 const SLOPE_STEP_M: f32 = 1.5;
 
 /// What the pixels of a surface count as.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
-    #[default]
-    Nothing = 0,
     /// Ground, and what may stand on it in the same tile: each pixel speaks for itself.
-    Ground = 1,
-    Obstacle = 2,
-    Other = 3,
+    Ground,
+    Obstacle,
+    Other,
+}
+
+/// The roles of the pixels of a row of a tile, the first pixel in the lowest bit.
+#[derive(Default)]
+struct Roles {
+    any: u32,
+    ground: u32,
+    obstacle: u32,
 }
 
 /// What a pixel says of its cell: the lowest bits of a key.
@@ -44,7 +50,8 @@ pub(super) struct Common {
 }
 
 impl Common {
-    pub(super) const NOTHING: Self = Self { role: Role::Nothing, across: [0.0; 3] };
+    /// Of no surface at all.
+    pub(super) const UNSET: Self = Self { role: Role::Other, across: [0.0; 3] };
 
     /// The slope of the ground belongs to the surface, not to the pixel.
     fn of(surface: &Surface, ground: &Terrain) -> Self {
@@ -134,8 +141,8 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             climb_step: rise(rays.along_row),
             camera_height_m: plane.height_m(rays.origin_m),
         };
-        let (mut roles, mut noise_per_m2) = ([0; TILE], [0.0; TILE]);
-        self.spread(&labels, &row, &mut roles, &mut noise_per_m2);
+        let mut noise_per_m2 = [0.0; TILE];
+        let roles = self.spread(&labels, &row, &mut noise_per_m2);
         let (mut keys, mut heights_dm) = ([0; TILE], [0; TILE]);
         for first in (0..TILE).step_by(LANES) {
             self.lanes(first, &row, &pixels, &roles, &noise_per_m2, &mut keys, &mut heights_dm);
@@ -143,30 +150,42 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
         self.count(&keys, &heights_dm);
     }
 
-    /// Gives every pixel the role of its surface, and the noise of its height for each square metre of its range squared: the error
-    /// of its distance, times how fast its ray drops towards the ground there, at the first pixel of its run. A slope that rises
-    /// towards the robot is seen at a larger angle, and its heights are less certain.
+    /// The role of every pixel, and the noise of its height for each square metre of its range squared: the error of its distance,
+    /// times how fast its ray drops towards the ground there, at the first pixel of its run. A slope that rises towards the robot is
+    /// seen at a larger angle, and its heights are less certain.
     #[inline(always)]
-    fn spread(&self, labels: &[u8; TILE], row: &Row, roles: &mut [i32; TILE], noise_per_m2: &mut [f32; TILE]) {
+    fn spread(&self, labels: &[u8; TILE], row: &Row, noise_per_m2: &mut [f32; TILE]) -> Roles {
         let pair = self.view.pair;
         let focal_baseline_px_m = pair.focal_px * pair.baseline_m;
         let mut before = [0; TILE];
         before[1..].copy_from_slice(&labels[..TILE - 1]);
-        for bit in each_bit(!same(labels, &before)) {
-            let first = bit.trailing_zeros() as usize;
-            let label = labels.get(first).copied().unwrap_or(0);
-            let common = usize::from(label).checked_sub(1).and_then(|i| self.common.get(i)).unwrap_or(&Common::NOTHING);
+        let mut roles = Roles::default();
+        let changes = !same(labels, &before);
+        for bit in each_bit(changes) {
+            let first = bit.trailing_zeros();
+            let label = labels.get(first as usize).copied().unwrap_or(0);
+            let Some(common) = usize::from(label).checked_sub(1).and_then(|i| self.common.get(i)) else { continue };
+            let upto = bit | (bit - 1);
+            let after = changes & !upto;
+            // The pixels from here to the next run.
+            let run = (after & after.wrapping_neg()).wrapping_sub(1) & !(bit - 1);
+            roles.any |= run;
+            match common.role {
+                Role::Ground => roles.ground |= run,
+                Role::Obstacle => roles.obstacle |= run,
+                Role::Other => {}
+            }
             let step = self.view.rays.along_row;
             let at = |i: usize| row.direction[i] + first as f32 * step[i];
             let [nx, ny, nz] = common.across;
             let drop = at(0) * nx + at(1) * ny + at(2) * nz;
             let noise = self.settings.height_noise_px * drop.abs() / focal_baseline_px_m;
-            // All that follows, as far as the next run: without a branch on where that is.
-            for k in 0..TILE {
-                roles[k] = if k >= first { common.role as i32 } else { roles[k] };
-                noise_per_m2[k] = if k >= first { noise } else { noise_per_m2[k] };
+            // All that follow, as far as the next run: without a branch on where that is.
+            for (noise_per_m2, k) in noise_per_m2.iter_mut().zip(0..) {
+                *noise_per_m2 = if k >= first as i32 { noise } else { *noise_per_m2 };
             }
         }
+        roles
     }
 
     /// Finds the cells of [`LANES`] pixels, and what they say of them: a key of both, 0 where that is nothing.
@@ -177,16 +196,15 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
         first: usize,
         row: &Row,
         pixels: &Piece,
-        roles: &[i32; TILE],
+        roles: &Roles,
         noise_per_m2: &[f32; TILE],
         keys: &mut [u16; TILE],
         heights_dm: &mut [u8; TILE],
     ) {
-        let (Some(pixels), Some(roles), Some(noise_per_m2)) =
-            (lanes_of(pixels, first), lanes_of(roles, first), lanes_of(noise_per_m2, first))
-        else {
+        let (Some(pixels), Some(noise_per_m2)) = (group(pixels, first), group(noise_per_m2, first)) else {
             return;
         };
+        let [known, is_ground, is_obstacle] = [roles.any, roles.ground, roles.obstacle].map(|bits| bits >> first);
         let view = self.view;
         let MapGeometry { x_first, x_count, y_first, y_count, .. } = self.settings.geometry;
         let per_cell = 1.0 / self.settings.geometry.cell_size_m();
@@ -200,9 +218,9 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             y[k] = origin[1] + z[k] * (row.direction[1] + along * step[1]);
             above_plane[k] = row.camera_height_m + z[k] * (row.climb + along * row.climb_step);
             let [ahead, aside] = view.place.to_vehicle([x[k], y[k]]);
-            let i = floor(ahead * per_cell) - i32::from(x_first);
-            let j = floor(aside * per_cell) - i32::from(y_first);
-            let inside = (i as u32) < u32::from(x_count) && (j as u32) < u32::from(y_count) && roles[k] != 0;
+            let i = floor(ahead * per_cell, -32768.0, 32767.0) - i32::from(x_first);
+            let j = floor(aside * per_cell, -32768.0, 32767.0) - i32::from(y_first);
+            let inside = (i as u32) < u32::from(x_count) && (j as u32) < u32::from(y_count) && known & 1 << k != 0;
             cells[k] = if inside { i.wrapping_mul(i32::from(y_count)).wrapping_add(j) } else { -1 };
             any |= !cells[k];
         }
@@ -219,7 +237,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             let too_high = height > limit;
             // Ground that lies deeper than expected is a drop, or the top of what stands below.
             let too_low = height < -limit;
-            let (is_ground, is_obstacle) = (roles[k] == Role::Ground as i32, roles[k] == Role::Obstacle as i32);
+            let (is_ground, is_obstacle) = (is_ground & 1 << k != 0, is_obstacle & 1 << k != 0);
             // What stands upright is an obstacle as soon as it does not pass for ground.
             let stands = too_high & (is_obstacle | (is_ground & (height >= min_height)));
             let reachable = height <= clearance;
@@ -232,9 +250,9 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             } else {
                 0
             };
-            let known = cells[k] >= 0 && vote != 0;
-            keys[first + k] = if known { (cells[k] as u16) << VOTE_BITS | vote } else { 0 };
-            heights_dm[first + k] = (height * 10.0).clamp(0.0, 255.0) as i32 as u8;
+            let says = cells[k] >= 0 && vote != 0;
+            keys[first + k] = if says { (cells[k] as u16) << VOTE_BITS | vote } else { 0 };
+            heights_dm[first + k] = floor(height * 10.0, 0.0, 255.0) as u8;
         }
     }
 
@@ -267,14 +285,6 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
 
 /// [`LANES`] values from `first` on.
 #[inline(always)]
-fn lanes_of<T>(values: &[T; TILE], first: usize) -> Option<&[T; LANES]> {
+fn group<T>(values: &[T; TILE], first: usize) -> Option<&[T; LANES]> {
     values.get(first..).and_then(|rest| rest.first_chunk())
-}
-
-/// As [`super::cells::floor`], in numbers as wide as those of which it is made.
-#[inline(always)]
-fn floor(x: f32) -> i32 {
-    let whole = x as i32;
-    let whole = if whole as f32 > x { whole.saturating_sub(1) } else { whole };
-    whole.clamp(i32::from(i16::MIN), i32::from(i16::MAX))
 }
