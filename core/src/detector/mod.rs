@@ -144,7 +144,9 @@ impl<
             sector_width_deg: settings.map.sector_width_deg,
         };
         self.interpreter.configure(settings, &setup, mount.height_m.is_some())?;
-        self.interpreter.choose(Chosen::new(self.matcher.backend()).unwrap_or(Chosen::PLAIN));
+        let chosen = Chosen::new(self.matcher.backend()).unwrap_or(Chosen::PLAIN);
+        self.rectifier.choose(chosen);
+        self.interpreter.choose(chosen);
         settings.health.check()?;
         self.health = settings.health;
         self.forget_pictures();
