@@ -102,6 +102,7 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
 
     /// Has the stages run with the instructions of a backend.
     pub(super) const fn choose(&mut self, chosen: Chosen) {
+        self.surfaces.choose(chosen);
         self.map.choose(chosen);
     }
 

@@ -146,6 +146,8 @@ impl<
         self.interpreter.configure(settings, &setup, mount.height_m.is_some())?;
         let chosen = Chosen::new(self.matcher.backend()).unwrap_or(Chosen::PLAIN);
         self.rectifier.choose(chosen);
+        self.surface_size.choose(chosen);
+        self.content.choose(chosen);
         self.interpreter.choose(chosen);
         settings.health.check()?;
         self.health = settings.health;

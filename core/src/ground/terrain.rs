@@ -5,7 +5,7 @@ use crate::{
     disparity::DisparityPicture,
     geometry::{DepthTable, Rays},
     lanes::floor,
-    surfaces::{SurfaceClass, Surfaces},
+    surfaces::{SurfaceClass, Surfaces, TILE},
 };
 
 /// Patches ahead, and to both sides together.
@@ -15,6 +15,8 @@ const ACROSS: usize = 40;
 /// Of so many pixels along and across the rows one is looked at.
 const STEP_X: usize = 4;
 const STEP_Y: usize = 2;
+
+const _: () = assert!(TILE.is_multiple_of(STEP_X), "the first pixel of a tile is one that is looked at");
 
 /// Pixels that the plane itself counts for under the robot, where the ground is too near to be seen.
 const PLANE_WEIGHT: f32 = 25.0;
@@ -101,19 +103,29 @@ impl Terrain {
     ) {
         self.flatten(plane);
         self.patch_m = bend.patch_m;
+        // The surfaces of another picture say nothing about this one.
+        let height = if (picture.width(), picture.height()) == surfaces.size() { picture.height() } else { 0 };
         for round in [Round::Follow, Round::Trim, Round::Trim] {
             self.begin();
-            for y in (0..picture.height()).rev().step_by(STEP_Y) {
-                for (x, pixel) in picture.row(y).iter().enumerate().step_by(STEP_X) {
-                    if !pixel.has_value() {
+            for y in (0..height).rev().step_by(STEP_Y) {
+                let (row, labels) = (picture.row(y), surfaces.labels_row(y));
+                for (x0, (pixels, labels)) in (0..).step_by(TILE).zip(row.chunks(TILE).zip(labels.chunks(TILE))) {
+                    let table = surfaces.of_tile(x0, y);
+                    if table.is_empty() {
                         continue;
                     }
-                    let surface = surfaces.surface_at(x, y).filter(|surface| surface.class != SurfaceClass::Vertical);
-                    let Some(surface) = surface else { continue };
-                    let z = depth.distance_m(pixel.steps());
-                    let direction = rays.direction(x as f32, y as f32);
-                    let point: [f32; 3] = core::array::from_fn(|i| rays.origin_m[i] + z * direction[i]);
-                    self.add(round, point, surface.class == SurfaceClass::Ground, bend);
+                    for (i, (pixels, labels)) in pixels.chunks(STEP_X).zip(labels.chunks(STEP_X)).enumerate() {
+                        let (Some(pixel), Some(&label)) = (pixels.first(), labels.first()) else { continue };
+                        let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(i));
+                        let Some(surface) = surface.filter(|surface| surface.class != SurfaceClass::Vertical) else {
+                            continue;
+                        };
+                        let x = x0 + i * STEP_X;
+                        let z = depth.distance_m(pixel.steps());
+                        let direction = rays.direction(x as f32, y as f32);
+                        let point: [f32; 3] = core::array::from_fn(|i| rays.origin_m[i] + z * direction[i]);
+                        self.add(round, point, surface.class == SurfaceClass::Ground, bend);
+                    }
                 }
             }
             self.settle(bend.share);

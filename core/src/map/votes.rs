@@ -6,7 +6,7 @@ use crate::{
     disparity::DisparityPicture,
     ground::Terrain,
     lanes::floor,
-    links::{PIECE, Piece, each_bit, near, same},
+    links::{PIECE, Piece, changes, each_bit},
     surfaces::{MAX_TILE_SURFACES, Surface, SurfaceClass, Surfaces, TILE},
 };
 
@@ -157,10 +157,8 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
     fn spread(&self, labels: &[u8; TILE], row: &Row, noise_per_m2: &mut [f32; TILE]) -> Roles {
         let pair = self.view.pair;
         let focal_baseline_px_m = pair.focal_px * pair.baseline_m;
-        let mut before = [0; TILE];
-        before[1..].copy_from_slice(&labels[..TILE - 1]);
         let mut roles = Roles::default();
-        let changes = !same(labels, &before);
+        let changes = changes(labels);
         for bit in each_bit(changes) {
             let first = bit.trailing_zeros();
             let label = labels.get(first as usize).copied().unwrap_or(0);
@@ -259,9 +257,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
     /// Counts what the pixels of a row say: neighbours that say the same of the same cell at once.
     #[inline(always)]
     fn count(&mut self, keys: &[u16; TILE], heights_dm: &[u8; TILE]) {
-        let mut before = [0; TILE];
-        before[1..].copy_from_slice(&keys[..TILE - 1]);
-        let changes = !near(keys, &before, 0);
+        let changes = changes(keys);
         for bit in each_bit(changes) {
             let first = bit.trailing_zeros() as usize;
             let after = changes & !(bit | (bit - 1));
