@@ -28,6 +28,9 @@ mod decide;
 mod generic;
 mod jobs;
 mod plain;
+#[cfg(dsp)]
+#[expect(unsafe_code, reason = "instructions that have no functions of their own, and sums read four at a time")]
+mod thumb;
 #[cfg(target_arch = "x86_64")]
 #[expect(unsafe_code, reason = "instructions that not every processor has, used where it has them")]
 mod x86_64;
@@ -47,11 +50,13 @@ pub enum Backend {
     Sse41 = 2,
     /// x86-64 with AVX2: 32 bytes at a time.
     Avx2 = 3,
+    /// Cortex-M4 and M7, and ARMv7: four bytes of a register at a time.
+    Dsp = 6,
 }
 
 impl Backend {
     /// Every backend, slowest first.
-    pub const ALL: &[Self] = &[Self::Plain, Self::Sse2, Self::Sse41, Self::Avx2];
+    pub const ALL: &[Self] = &[Self::Plain, Self::Sse2, Self::Sse41, Self::Avx2, Self::Dsp];
 
     /// Name as it is written in reports.
     pub const fn name(self) -> &'static str {
@@ -60,6 +65,7 @@ impl Backend {
             Self::Sse2 => "sse2",
             Self::Sse41 => "sse4.1",
             Self::Avx2 => "avx2",
+            Self::Dsp => "dsp",
         }
     }
 
@@ -68,7 +74,7 @@ impl Backend {
         #[cfg(target_arch = "x86_64")]
         return x86_64::is_available(self);
         #[cfg(not(target_arch = "x86_64"))]
-        return self == Self::Plain;
+        return self == Self::Plain || (cfg!(dsp) && self == Self::Dsp);
     }
 
     /// The last one of [`Self::ALL`] that is available.
@@ -84,7 +90,7 @@ impl Backend {
     /// Bytes that are worked on at once: tables are padded to a multiple.
     pub(crate) const fn lanes(self) -> usize {
         match self {
-            Self::Plain => 1,
+            Self::Plain | Self::Dsp => 1,
             Self::Sse2 | Self::Sse41 => 16,
             Self::Avx2 => 32,
         }
@@ -121,6 +127,8 @@ pub(crate) fn slide_codes(chosen: Chosen, job: SlideCodes<'_>) {
     match chosen.0 {
         #[cfg(target_arch = "x86_64")]
         Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => x86_64::slide_codes(chosen, job),
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::slide_codes(job),
         _ => plain::slide_codes(job),
     }
 }
@@ -157,6 +165,8 @@ pub(crate) fn search_keys(
         Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
             x86_64::search_keys(chosen, search, limits, columns, work, right, found);
         }
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::search_keys(search, limits, columns, work, right, found),
         _ => plain::search_keys(search, limits, columns, work, right, found),
     }
 }
@@ -179,6 +189,8 @@ pub(crate) fn search_bytes(
         Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
             x86_64::search_costs(chosen, search, columns, work, right, found);
         }
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::search_costs(search, columns, work, right, found),
         _ => plain::search_costs(search, columns, work, right, found),
     }
 }

@@ -20,6 +20,7 @@ use sse41::Sse41;
 pub(super) fn is_available(backend: Backend) -> bool {
     match backend {
         Backend::Plain | Backend::Sse2 => true,
+        Backend::Dsp => false,
         Backend::Sse41 => {
             let (_, features) = features();
             has(features, 9) && has(features, 19)
@@ -97,7 +98,7 @@ pub(super) fn slide_codes(chosen: Chosen, job: SlideCodes<'_>) {
         match chosen.backend() {
             Backend::Avx2 => slide_avx2(job),
             Backend::Sse41 => slide_sse41(job),
-            Backend::Plain | Backend::Sse2 => slide_sse2(job),
+            Backend::Plain | Backend::Sse2 | Backend::Dsp => slide_sse2(job),
         }
     }
 }
@@ -117,7 +118,7 @@ pub(super) fn search_keys(
         match chosen.backend() {
             Backend::Avx2 => keys_avx2(search, limits, columns, work, right, found),
             Backend::Sse41 => keys_sse41(search, limits, columns, work, right, found),
-            Backend::Plain | Backend::Sse2 => keys_sse2(search, limits, columns, work, right, found),
+            Backend::Plain | Backend::Sse2 | Backend::Dsp => keys_sse2(search, limits, columns, work, right, found),
         }
     }
 }
@@ -136,7 +137,7 @@ pub(super) fn search_costs(
         match chosen.backend() {
             Backend::Avx2 => costs_avx2(search, columns, work, right, found),
             Backend::Sse41 => costs_sse41(search, columns, work, right, found),
-            Backend::Plain | Backend::Sse2 => costs_sse2(search, columns, work, right, found),
+            Backend::Plain | Backend::Sse2 | Backend::Dsp => costs_sse2(search, columns, work, right, found),
         }
     }
 }
