@@ -14,16 +14,15 @@
 #![no_std]
 #![no_main]
 
+mod board;
 mod case;
 mod clock;
 mod robot;
 mod stack;
 
-use core::panic::PanicInfo;
-
 use cortex_m::Peripherals;
 use cortex_m_rt::entry;
-use cortex_m_semihosting::{debug, hprint, hprintln};
+use cortex_m_semihosting::{hprint, hprintln};
 use embedded_can::StandardId;
 use fencepost_core::{
     arch::Backend,
@@ -34,6 +33,7 @@ use fencepost_core::{
 };
 use heapless::{Vec, VecView};
 
+use board::fail;
 use case::{Case, Cases, Setup};
 use clock::Clock;
 use robot::{FRAMES, HEIGHT, RUNS, RobotDetection, RobotDetector, WIDTH};
@@ -78,7 +78,7 @@ fn main() -> ! {
         }
     }
     hprintln!("done");
-    exit(debug::EXIT_SUCCESS)
+    board::succeed()
 }
 
 /// The pictures, where they were laid.
@@ -182,21 +182,4 @@ fn fencepost_encode(
     frames: &mut VecView<Frame>,
 ) -> Result<EncodeReport, OutputFull> {
     robot::encode(encoder, detection, scan_index, frames)
-}
-
-fn fail(why: &str) -> ! {
-    hprintln!("failed: {}", why);
-    exit(debug::EXIT_FAILURE)
-}
-
-fn exit(status: debug::ExitStatus) -> ! {
-    loop {
-        debug::exit(status);
-    }
-}
-
-#[panic_handler]
-fn panic(info: &PanicInfo<'_>) -> ! {
-    hprintln!("{}", info);
-    exit(debug::EXIT_FAILURE)
 }

@@ -49,7 +49,10 @@ pub(crate) struct Search {
     pub(crate) right_end: usize,
     pub(crate) uniqueness_percent: u16,
     /// Whether no cost is above 2040 and no sum of a column above 127.
-    #[cfg_attr(not(any(target_arch = "x86_64", dsp)), expect(dead_code, reason = "plain Rust has one way for all costs"))]
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", dsp)),
+        expect(dead_code, reason = "plain Rust has one way for all costs")
+    )]
     pub(crate) is_small: bool,
 }
 

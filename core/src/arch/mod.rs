@@ -96,6 +96,15 @@ impl Backend {
         }
     }
 
+    /// Whether its vectors can work on columns of so many disparities.
+    pub(crate) const fn takes(self, disparities: usize) -> bool {
+        match self {
+            #[cfg(dsp)]
+            Self::Dsp => thumb::takes(disparities),
+            _ => disparities > 0,
+        }
+    }
+
     /// Whether right codes are kept as two rows of four bits each, to be looked up.
     pub(crate) const fn splits_codes(self) -> bool {
         matches!(self, Self::Sse41 | Self::Avx2)

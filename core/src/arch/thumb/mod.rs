@@ -18,35 +18,25 @@ mod slide;
 mod words;
 
 use super::{
-    jobs::{Found, KeyLimits, Right, Search, SlideCodes},
+    jobs::{Found, Right, Search},
     plain,
 };
 
-/// Places that are worked on at a time: what is no multiple of it is left to plain Rust.
+pub(super) use search::search_keys;
+pub(super) use slide::slide_codes;
+
+/// Places that are worked on at a time.
 const BLOCK: usize = 8;
 
-/// Lets a row of codes in and another one out.
-pub(super) fn slide_codes(job: SlideCodes<'_>) {
-    if fits(job.stride, job.disparities) { slide::slide_codes(job) } else { plain::slide_codes(job) }
+/// Places that a key has room for.
+const MOST_PLACES: usize = 128;
+
+/// Whether columns of so many disparities can be worked on.
+pub(super) const fn takes(disparities: usize) -> bool {
+    disparities.is_multiple_of(BLOCK) && disparities <= MOST_PLACES
 }
 
-/// Searches by keys.
-pub(super) fn search_keys(
-    search: &Search,
-    limits: &KeyLimits,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Right<'_>,
-    found: &mut Found,
-) {
-    if fits(search.stride, search.disparities) {
-        search::search_keys(search, limits, columns, work, right, found);
-    } else {
-        plain::search_keys(search, limits, columns, work, right, found);
-    }
-}
-
-/// Searches by costs; where costs are large or the right pixels are asked, in plain Rust.
+/// Searches by costs; where they are large or the right pixels are asked, in plain Rust.
 pub(super) fn search_costs(
     search: &Search,
     columns: &[u8],
@@ -54,14 +44,9 @@ pub(super) fn search_costs(
     right: Option<Right<'_>>,
     found: &mut Found,
 ) {
-    if fits(search.stride, search.disparities) && search.is_small && right.is_none() {
+    if search.is_small && right.is_none() {
         search::search_costs(search, columns, work, found);
     } else {
         plain::search_costs(search, columns, work, right, found);
     }
-}
-
-/// Whether columns are made of whole blocks.
-const fn fits(stride: usize, disparities: usize) -> bool {
-    stride == disparities && disparities.is_multiple_of(BLOCK) && disparities <= 128
 }

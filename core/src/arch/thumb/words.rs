@@ -7,7 +7,9 @@ use core::arch::asm;
 pub(super) fn bytes_less(a: u32, b: u32) -> u32 {
     let difference;
     // SAFETY: computes with registers; `build.rs` guarantees that the processor has the instruction.
-    unsafe { asm!("usub8 {0}, {1}, {2}", lateout(reg) difference, in(reg) a, in(reg) b, options(pure, nomem, nostack)) };
+    unsafe {
+        asm!("usub8 {0}, {1}, {2}", lateout(reg) difference, in(reg) a, in(reg) b, options(pure, nomem, nostack))
+    };
     difference
 }
 
@@ -42,18 +44,6 @@ pub(super) fn least(a: u32, b: u32) -> u32 {
     // SAFETY: computes with registers; `build.rs` guarantees that the processor has the instructions.
     unsafe {
         asm!("usub16 {0}, {1}, {2}", "sel {0}, {2}, {1}", out(reg) least, in(reg) a, in(reg) b,
-            options(pure, nomem, nostack));
-    }
-    least
-}
-
-/// The lesser ones of two 16-bit numbers with a sign.
-#[inline(always)]
-pub(super) fn least_signed(a: u32, b: u32) -> u32 {
-    let least;
-    // SAFETY: computes with registers; `build.rs` guarantees that the processor has the instructions.
-    unsafe {
-        asm!("ssub16 {0}, {1}, {2}", "sel {0}, {2}, {1}", out(reg) least, in(reg) a, in(reg) b,
             options(pure, nomem, nostack));
     }
     least
