@@ -31,6 +31,9 @@ mod decide;
 mod generic;
 mod jobs;
 mod plain;
+#[cfg(dsp)]
+#[expect(unsafe_code, reason = "instructions that have no functions of their own, and sums read four at a time")]
+mod thumb;
 #[cfg(target_arch = "x86_64")]
 #[expect(unsafe_code, reason = "instructions that not every processor has, used where it has them")]
 mod x86_64;
@@ -54,11 +57,13 @@ pub enum Backend {
     Avx512 = 4,
     /// AArch64: 16 bytes at a time, bits counted by an instruction.
     Neon = 5,
+    /// Cortex-M4 and M7, and ARMv7: four bytes of a register at a time.
+    Dsp = 6,
 }
 
 impl Backend {
     /// Every backend; those of a processor slowest first.
-    pub const ALL: &[Self] = &[Self::Plain, Self::Sse2, Self::Sse41, Self::Avx2, Self::Avx512, Self::Neon];
+    pub const ALL: &[Self] = &[Self::Plain, Self::Sse2, Self::Sse41, Self::Avx2, Self::Avx512, Self::Neon, Self::Dsp];
 
     /// Name as it is written in reports.
     pub const fn name(self) -> &'static str {
@@ -69,6 +74,7 @@ impl Backend {
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
             Self::Neon => "neon",
+            Self::Dsp => "dsp",
         }
     }
 
@@ -78,7 +84,8 @@ impl Backend {
         return x86_64::is_available(self);
         #[cfg(not(target_arch = "x86_64"))]
         return self == Self::Plain
-            || (cfg!(all(target_arch = "aarch64", target_feature = "neon")) && self == Self::Neon);
+            || (cfg!(all(target_arch = "aarch64", target_feature = "neon")) && self == Self::Neon)
+            || (cfg!(dsp) && self == Self::Dsp);
     }
 
     /// The last one of [`Self::ALL`] that is available.
@@ -94,10 +101,19 @@ impl Backend {
     /// Bytes that are worked on at once: tables are padded to a multiple.
     pub(crate) const fn lanes(self) -> usize {
         match self {
-            Self::Plain => 1,
+            Self::Plain | Self::Dsp => 1,
             Self::Sse2 | Self::Sse41 | Self::Neon => 16,
             Self::Avx2 => 32,
             Self::Avx512 => 64,
+        }
+    }
+
+    /// Whether its vectors can work on columns of so many disparities.
+    pub(crate) const fn takes(self, disparities: usize) -> bool {
+        match self {
+            #[cfg(dsp)]
+            Self::Dsp => thumb::takes(disparities),
+            _ => disparities > 0,
         }
     }
 
@@ -134,6 +150,8 @@ pub(crate) fn slide_codes(chosen: Chosen, job: SlideCodes<'_>) {
         Backend::Sse2 | Backend::Sse41 | Backend::Avx2 | Backend::Avx512 => x86_64::slide_codes(chosen, job),
         #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
         Backend::Neon => aarch64::slide_codes(job),
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::slide_codes(job),
         _ => plain::slide_codes(job),
     }
 }
@@ -162,6 +180,8 @@ pub(crate) fn search_keys(chosen: Chosen, job: KeyJob<'_>) {
         Backend::Sse2 | Backend::Sse41 | Backend::Avx2 | Backend::Avx512 => x86_64::search_keys(chosen, job),
         #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
         Backend::Neon => aarch64::search_keys(job),
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::search_keys(job),
         _ => plain::search_keys(job),
     }
 }
@@ -176,6 +196,8 @@ pub(crate) fn search_bytes(chosen: Chosen, job: CostJob<'_, u8>) {
         Backend::Sse2 | Backend::Sse41 | Backend::Avx2 | Backend::Avx512 => x86_64::search_costs(chosen, job),
         #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
         Backend::Neon => aarch64::search_costs(job),
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::search_costs(job),
         _ => plain::search_costs(job),
     }
 }

@@ -69,7 +69,7 @@ impl Terrain {
     pub const fn new() -> Self {
         Self {
             plane: GroundPlane::UNSET,
-            patch_m: 1.0,
+            patch_m: 0.0,
             lift_m: [[0.0; ACROSS]; AHEAD],
             weight: [[0.0; ACROSS]; AHEAD],
             sum_m: [[0.0; ACROSS]; AHEAD],
@@ -82,6 +82,10 @@ impl Terrain {
     /// One pass over the patches.
     pub fn flatten(&mut self, plane: GroundPlane) {
         self.plane = plane;
+        if self.patch_m == 0.0 {
+            // Any length does where nothing bends; a detector that is not configured is all zero.
+            self.patch_m = 1.0;
+        }
         for lift_m in &mut self.lift_m {
             lift_m.fill(0.0);
         }
