@@ -6,7 +6,7 @@ mod memory;
 mod stage;
 
 pub use detection::{DetectError, Detection, Statistics};
-pub use memory::{Capacities, memory_bytes};
+pub use memory::{Capacities, MemoryPart, memory_bytes};
 pub use stage::{Probe, Stage};
 
 use crate::{

@@ -155,7 +155,7 @@ fn encode(
     let room = out.capacity().saturating_sub(out.len()).checked_sub(FIXED_FRAMES_PER_SCAN).ok_or(OutputFull)?;
     let runs_per_frame = config.format().runs_per_frame();
     let max_frames = room.min(usize::from(config.max_cell_frames()));
-    let selection = select(scan.geometry, scan.cells, max_frames * runs_per_frame, runs);
+    let selection = select(scan.geometry, scan.cells, max_frames.saturating_mul(runs_per_frame), runs);
     let frame_count = runs.len().div_ceil(runs_per_frame);
 
     let first = out.len();
@@ -197,7 +197,11 @@ fn encode(
     };
     add(counters.frame(Message::End, |data| end.emit(data)))?;
 
-    Ok(EncodeReport { frames: out.len() - first, cells: selection.cells, dropped_cells: selection.dropped })
+    Ok(EncodeReport {
+        frames: out.len().saturating_sub(first),
+        cells: selection.cells,
+        dropped_cells: selection.dropped,
+    })
 }
 
 impl core::fmt::Display for OutputFull {

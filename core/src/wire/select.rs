@@ -81,7 +81,7 @@ fn insert(heap: &mut VecView<Run, u16>, limit: usize, run: Run) -> u32 {
         if heap.push(run).is_err() {
             return u32::from(run.length);
         }
-        let last = heap.len() - 1;
+        let last = heap.len().saturating_sub(1);
         sift_up(heap, last);
         return 0;
     }
@@ -118,8 +118,9 @@ fn sift_up(heap: &mut [Run], mut child: usize) {
 
 fn sift_down(heap: &mut [Run], mut parent: usize) {
     loop {
-        let left = 2 * parent + 1;
-        let child = if is_higher(heap, left + 1, left) { left + 1 } else { left };
+        let left = parent.saturating_mul(2).saturating_add(1);
+        let right = left.saturating_add(1);
+        let child = if is_higher(heap, right, left) { right } else { left };
         if !is_higher(heap, child, parent) {
             return;
         }
