@@ -176,8 +176,8 @@ fn encode(
         FrameFormat::Fd => Message::CellsFd,
     };
     let mut scan_crc = ScanCrc::START;
-    for (k, chunk) in runs.chunks(runs_per_frame).enumerate() {
-        let mut cells = CellsRepr { scan_low, sequence: k as u8 & 0xF, runs: [None; CellsRepr::FD_RUNS] };
+    for (chunk, sequence) in runs.chunks(runs_per_frame).zip((0..=0xF).cycle()) {
+        let mut cells = CellsRepr { scan_low, sequence, runs: [None; CellsRepr::FD_RUNS] };
         cells.runs.iter_mut().zip(chunk).for_each(|(to, run)| *to = Some(*run));
         let frame = counters.frame(message, |data| cells.emit(data));
         scan_crc.add(frame.data().get(2..).unwrap_or(&[]));
