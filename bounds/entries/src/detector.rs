@@ -123,11 +123,7 @@ fn entry_match_begin(matcher: &mut Matcher<WIDTH, DISPARITIES>) {
 }
 
 #[unsafe(no_mangle)]
-fn entry_match_push(
-    matcher: &mut Matcher<WIDTH, DISPARITIES>,
-    rows: &[&[u8]; 2],
-    spans: &[ValidSpan; 2],
-) {
+fn entry_match_push(matcher: &mut Matcher<WIDTH, DISPARITIES>, rows: &[&[u8]; 2], spans: &[ValidSpan; 2]) {
     matcher.push(rows[0], rows[1], spans[0], spans[1]);
 }
 
@@ -271,10 +267,7 @@ fn entry_map_sectors(map: &ObstacleMap<CELLS>, width_deg: f32) -> SectorDistance
 }
 
 #[unsafe(no_mangle)]
-fn entry_map_merge(
-    merged: &mut Merged<CELLS>,
-    detection: &Detection<OBSTACLES, CELLS>,
-) -> Result<Health, OtherCells> {
+fn entry_map_merge(merged: &mut Merged<CELLS>, detection: &Detection<OBSTACLES, CELLS>) -> Result<Health, OtherCells> {
     merged.clear();
     merged.add(detection)?;
     Ok(merged.health())

@@ -6,7 +6,7 @@ use fencepost_core::{
     ground::GroundPlane,
     map::{MapGeometry, SectorDistances},
     wire::{
-        self, Address, Command, CommandEncoder, CommandReceiver, CellsRepr, CounterCheck, EncodeReport, EndRepr, Frame,
+        self, Address, CellsRepr, Command, CommandEncoder, CommandReceiver, CounterCheck, EncodeReport, EndRepr, Frame,
         GroundRepr, HeaderRepr, HeartbeatRepr, MeaninglessValue, NoScan, OutputFull, Packet, PacketError, ReceiveError,
         Received, ReceivedScan, ReceiverConfig, Scan, ScanCrc, ScanEchoRepr, ScanEncoder, ScanReceiver, SectorsRepr,
         Signal, Status, Step, VehicleMotionRepr, WireConfig, WireSettings,

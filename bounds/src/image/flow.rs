@@ -298,3 +298,89 @@ impl<'a> Analysis<'a> {
         (are_known && !targets.is_empty()).then_some(targets)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{
+        Function,
+        code::{Code, Kind},
+    };
+
+    /// Functions as an assembler makes them; their names, and the first addresses after them.
+    const CODE: [u16; 52] = [
+        // fixed: push {r4, lr}; sub sp, #16; bl saved; add sp, #16; pop {r4, pc}
+        0xb510, 0xb084, 0xf000, 0xf802, 0xb004, 0xbd10,
+        // saved: push {r7, lr}; vpush {d8, d9}; str lr, [sp, #-4]!; ldr lr, [sp], #4; vpop {d8, d9}; pop {r7, pc}
+        0xb580, 0xed2d, 0x8b04, 0xf84d, 0xed04, 0xf85d, 0xeb04, 0xecbd, 0x8b04, 0xbd80,
+        // circle: push {lr}; cmp r0, #0; itt eq; subeq r0, #1; popeq {pc}; bl circle; pop {pc}
+        0xb500, 0x2800, 0xbf04, 0x3801, 0xbd00, 0xf7ff, 0xfff9, 0xbd00,
+        // aligned: push {r4, r6, r7, lr}; add r7, sp, #8; sub r4, sp, #100; bfc r4, #0, #5; mov sp, r4; sub r4, r7, #8;
+        // mov sp, r4; pop {r4, r6, r7, pc}
+        0xb5d0, 0xaf02, 0xf1ad, 0x0464, 0xf36f, 0x0404, 0x46a5, 0xf1a7, 0x0408, 0x46a5, 0xbdd0,
+        // pointer: push {r7, lr}; blx r0; pop {r7, pc}
+        0xb580, 0x4780, 0xbd80,
+        // table: push {r7, lr}; tbb [pc, r0]; .byte 2, 4, 4, 0; sub sp, #64; add sp, #64; pop {r7, pc}
+        0xb580, 0xe8df, 0xf000, 0x0402, 0x0004, 0xb090, 0xb010, 0xbd80, // variable: sub sp, sp, r0; bx lr
+        0xebad, 0x0d00, 0x4770, // uneven: cbz r0, 1f; push {r4}; 1: bx lr
+        0xb100, 0xb410, 0x4770,
+    ];
+
+    const FUNCTIONS: [(&str, u32, u32); 8] = [
+        ("fixed", 0x0, 0xc),
+        ("saved", 0xc, 0x20),
+        ("circle", 0x20, 0x30),
+        ("aligned", 0x30, 0x46),
+        ("pointer", 0x46, 0x4c),
+        ("table", 0x4c, 0x5c),
+        ("variable", 0x5c, 0x62),
+        ("uneven", 0x62, 0x68),
+    ];
+
+    fn image() -> Image {
+        let bytes: Vec<u8> = CODE.iter().flat_map(|half| half.to_le_bytes()).collect();
+        let marks = BTreeMap::from([(0, Kind::Thumb), (0x52, Kind::Data), (0x56, Kind::Thumb)]);
+        let functions = FUNCTIONS.map(|(name, start, end)| (start, Function { name: name.to_owned(), end }));
+        Image {
+            functions: BTreeMap::from(functions),
+            code: Code::disassemble(&[(0, &bytes)], &marks).unwrap(),
+            detector_bytes: None,
+            allocators: Vec::new(),
+        }
+    }
+
+    /// Own depth, worst depth and flaws of a function.
+    fn found(name: &str) -> (u32, u32, Vec<String>) {
+        let image = image();
+        let mut analysis = Analysis::new(&image);
+        let (_, start, _) = FUNCTIONS.into_iter().find(|(other, ..)| *other == name).unwrap();
+        let depth = analysis.depth(start);
+        (depth.own, depth.worst, analysis.flaws().map(ToString::to_string).collect())
+    }
+
+    #[test]
+    fn pushes_and_calls_add_up() {
+        assert_eq!(found("saved"), (8 + 16 + 4, 28, vec![]));
+        assert_eq!(found("fixed"), (8 + 16, 24 + 28, vec![]));
+    }
+
+    #[test]
+    fn an_aligned_frame_takes_as_much_as_it_may() {
+        // 16 pushed, 100 for itself, up to 28 more down to a multiple of 32.
+        assert_eq!(found("aligned"), (144, 144, vec![]));
+    }
+
+    #[test]
+    fn a_table_leads_to_all_of_its_places() {
+        assert_eq!(found("table"), (8 + 64, 72, vec![]));
+    }
+
+    #[test]
+    fn what_has_no_bound_is_told_by_name() {
+        let flaw = |name: &str| found(name).2.join("; ");
+        assert_eq!(flaw("circle"), "recursion: circle calls circle");
+        assert_eq!(flaw("pointer"), "indirect call or jump in pointer at 0x48: blx r0");
+        assert!(flaw("variable").starts_with("frame of unknown size in variable at 0x5c: sub"), "{}", flaw("variable"));
+        assert!(flaw("uneven").starts_with("frame of unknown size in uneven at 0x66: "), "{}", flaw("uneven"));
+    }
+}

@@ -39,7 +39,8 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         let table = surfaces.table();
         let mut touch = |(ax, ay): (usize, usize), (bx, by): (usize, usize)| {
             let (Some(a), Some(b)) = (surfaces.place_at(ax, ay), surfaces.place_at(bx, by)) else { return };
-            let contiguous = picture.row(ay)[ax].steps().abs_diff(picture.row(by)[bx].steps()) <= step;
+            let steps = |x: usize, y: usize| picture.row(y).get(x).map_or(0, |pixel| pixel.steps());
+            let contiguous = steps(ax, ay).abs_diff(steps(bx, by)) <= step;
             let both = |a: usize, b: usize| Some(takes_part(table.get(a)?) && takes_part(table.get(b)?));
             if contiguous && both(a, b).unwrap_or(false) {
                 self.unite(a, b);
@@ -47,12 +48,12 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         };
         for y in (TILE..height).step_by(TILE) {
             for x in 0..width {
-                touch((x, y - 1), (x, y));
+                touch((x, y.saturating_sub(1)), (x, y));
             }
         }
         for x in (TILE..width).step_by(TILE) {
             for y in 0..height {
-                touch((x - 1, y), (x, y));
+                touch((x.saturating_sub(1), y), (x, y));
             }
         }
         self.chain(table.len());
@@ -60,8 +61,9 @@ impl<const SURFACES: usize> Regions<SURFACES> {
 
     /// The regions, each by the surface that stands for it. Surfaces that took no part are regions of their own.
     pub fn roots(&self) -> impl Iterator<Item = usize> {
-        self.parent[..self.len]
+        self.parent
             .iter()
+            .take(self.len)
             .enumerate()
             .filter(|&(place, &parent)| usize::from(parent) == place)
             .map(|(place, _)| place)
@@ -79,16 +81,20 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         self.len = len.min(SURFACES);
         for place in (0..self.len).rev() {
             let root = self.root(place);
-            self.parent[place] = root as u16;
-            self.next[place] = place as u16;
+            if let (Some(parent), Some(next)) = (self.parent.get_mut(place), self.next.get_mut(place)) {
+                (*parent, *next) = (root as u16, place as u16);
+            }
         }
         // A root is the first of its region, so everything can be hung in right behind it, from the end on.
         for place in (0..self.len).rev() {
-            let root = usize::from(self.parent[place]);
-            if root != place {
-                let behind = self.next[root];
-                self.next[place] = if usize::from(behind) == root { place as u16 } else { behind };
-                self.next[root] = place as u16;
+            let Some(root) = self.parent.get(place).map(|&root| usize::from(root)).filter(|&root| root != place) else {
+                continue;
+            };
+            let Some(behind) = self.next.get_mut(root).map(|next| core::mem::replace(next, place as u16)) else {
+                continue;
+            };
+            if let Some(next) = self.next.get_mut(place) {
+                *next = if usize::from(behind) == root { place as u16 } else { behind };
             }
         }
     }
@@ -100,8 +106,12 @@ impl<const SURFACES: usize> Regions<SURFACES> {
             if parent == place {
                 break;
             }
-            self.parent[place] = self.parent[parent];
-            place = usize::from(self.parent[place]);
+            // Every other one is hung one higher on the way, so that the next way is half as long.
+            let Some(&above) = self.parent.get(parent) else { break };
+            if let Some(halved) = self.parent.get_mut(place) {
+                *halved = above;
+            }
+            place = usize::from(above);
         }
         place
     }
