@@ -126,8 +126,11 @@ impl<'a> DisparityPicture<'a> {
             Some(height) => height,
             None => 0,
         };
-        let (pixels, _rest) = pixels.split_at(width * height);
-        Self { pixels, width, height }
+        match pixels.split_at_checked(width.saturating_mul(height)) {
+            Some((pixels, _rest)) => Self { pixels, width, height },
+            // Cannot be: the height is what the pixels have room for.
+            None => Self { pixels: &[], width, height: 0 },
+        }
     }
 
     /// Width in pixels.
@@ -142,7 +145,8 @@ impl<'a> DisparityPicture<'a> {
 
     /// Row `y` from the top; empty below the picture.
     pub fn row(&self, y: usize) -> &'a [DisparityPixel] {
-        if y < self.height { &self.pixels[y * self.width..(y + 1) * self.width] } else { &[] }
+        let start = y.saturating_mul(self.width);
+        self.pixels.get(start..start.saturating_add(self.width)).unwrap_or_default()
     }
 
     /// Pixels with a disparity, and those without, by [`Reason`].

@@ -74,8 +74,8 @@ impl<'a> Picture<'a> {
 
     /// Row `y` from the top, `width` pixels; the last row for any `y` below the picture.
     pub fn row(&self, y: usize) -> &'a [u8] {
-        let start = y.min(self.height - 1) * self.stride;
-        &self.data[start..start + self.width]
+        let start = y.min(self.height.saturating_sub(1)).saturating_mul(self.stride);
+        self.data.get(start..start.saturating_add(self.width)).unwrap_or_default()
     }
 }
 

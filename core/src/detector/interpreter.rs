@@ -1,6 +1,6 @@
 //! From the disparity picture to cells: the stages that depend on the method.
 
-use super::{Detection, Probe, Setup, Stage};
+use super::{Detection, MemoryPart, Probe, Setup, Stage};
 use crate::{
     arch::Chosen,
     disparity::DisparityPicture,
@@ -71,6 +71,21 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
             pixel_normals: PixelNormals::new(),
             other: OtherMap::new(),
         }
+    }
+
+    /// What its size is made of; see [`Detector::memory_parts`](super::Detector::memory_parts).
+    pub(super) const fn memory_parts() -> [MemoryPart; 9] {
+        [
+            MemoryPart::of::<DepthTable<DISPARITIES>>("triangulate"),
+            MemoryPart::of::<Surfaces<PIXELS, SURFACES>>("surfaces"),
+            MemoryPart::of::<Regions<SURFACES>>("regions"),
+            MemoryPart::of::<GroundFinder>("ground").and::<Option<GroundPlane>>(),
+            MemoryPart::of::<ObstacleFinder>("obstacles"),
+            MemoryPart::of::<MapBuilder<CELLS>>("map"),
+            MemoryPart::of::<CostMap>("other_methods").and::<GroundDeviation>().and::<DisparitySegments>(),
+            MemoryPart::of::<PixelNormals<WIDTH>>("pixel_normals"),
+            MemoryPart::of::<OtherMap<CELLS>>("cross_check"),
+        ]
     }
 
     /// Takes the settings of all detectors, so that a mistake in any of them is told whichever is chosen.

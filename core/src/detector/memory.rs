@@ -1,7 +1,14 @@
 //! How much memory a detector takes.
 
-use super::Detector;
-use crate::rectify::grid_nodes;
+use super::{Detection, Detector, Setup, interpreter::Interpreter};
+use crate::{
+    disparity::DisparityPixel,
+    health::{Content, ContentSigns, Debounce, HealthSettings, RecentPictures},
+    matching::Matcher,
+    methods::{ConfidenceSettings, Detectors},
+    rectify::{Rectifier, grid_nodes},
+    validate::SurfaceSize,
+};
 
 /// What a detector is to hold; the const generics of [`Detector`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +72,71 @@ pub const fn memory_bytes(capacities: &Capacities) -> usize {
         + SURFACES * capacities.surfaces
         + OBSTACLES * capacities.obstacles
         + CELLS * capacities.cells
+}
+
+/// A part of a detector and the bytes that it takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MemoryPart {
+    /// The stage, or what is kept beside the stages.
+    pub name: &'static str,
+    /// Its size.
+    pub bytes: usize,
+    /// What the size is a multiple of.
+    pub align: usize,
+}
+
+impl MemoryPart {
+    pub(super) const fn of<T>(name: &'static str) -> Self {
+        Self { name, bytes: size_of::<T>(), align: align_of::<T>() }
+    }
+
+    /// The part with a `T` besides; both of a size that no capacity changes.
+    pub(super) const fn and<T>(self) -> Self {
+        Self { bytes: self.bytes + size_of::<T>(), align: 1, ..self }
+    }
+}
+
+impl<
+    const PIXELS: usize,
+    const WIDTH: usize,
+    const DISPARITIES: usize,
+    const GRID: usize,
+    const SURFACES: usize,
+    const OBSTACLES: usize,
+    const CELLS: usize,
+> Detector<PIXELS, WIDTH, DISPARITIES, GRID, SURFACES, OBSTACLES, CELLS>
+{
+    /// What the size of a detector is made of, in the order in which the data pass through; what is left is padding.
+    pub const fn memory_parts() -> [MemoryPart; 18] {
+        let [depth, surfaces, regions, ground, obstacles, map, methods, pixel_normals, cross_check] =
+            Interpreter::<PIXELS, WIDTH, DISPARITIES, SURFACES, CELLS>::memory_parts();
+        [
+            MemoryPart::of::<Rectifier<GRID>>("rectify"),
+            MemoryPart::of::<[[u8; WIDTH]; 2]>("rectified_rows"),
+            MemoryPart::of::<Matcher<WIDTH, DISPARITIES>>("match"),
+            MemoryPart::of::<[DisparityPixel; PIXELS]>("disparity_picture"),
+            MemoryPart::of::<SurfaceSize<WIDTH>>("validate"),
+            depth,
+            surfaces,
+            regions,
+            ground,
+            obstacles,
+            map,
+            methods,
+            pixel_normals,
+            cross_check,
+            MemoryPart::of::<Content<WIDTH>>("health"),
+            MemoryPart::of::<[DisparityPixel; WIDTH]>("exchanged_row"),
+            MemoryPart::of::<Option<Setup>>("setup")
+                .and::<HealthSettings>()
+                .and::<ContentSigns>()
+                .and::<RecentPictures>()
+                .and::<Debounce>()
+                .and::<Detectors>()
+                .and::<ConfidenceSettings>(),
+            MemoryPart::of::<Detection<OBSTACLES, CELLS>>("detection"),
+        ]
+    }
 }
 
 #[cfg(test)]

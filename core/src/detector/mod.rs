@@ -6,7 +6,7 @@ mod memory;
 mod stage;
 
 pub use detection::{DetectError, Detection, Statistics};
-pub use memory::{Capacities, memory_bytes};
+pub use memory::{Capacities, MemoryPart, memory_bytes};
 pub use stage::{Probe, Stage};
 
 use crate::{
@@ -217,7 +217,7 @@ impl<
         self.match_rows(left, right, width, height, probe);
 
         probe.enter(Stage::Validate);
-        let disparity = &mut self.disparity[..width * height];
+        let disparity = self.disparity.get_mut(..width.saturating_mul(height)).unwrap_or_default();
         self.surface_size.run(disparity);
 
         let picture = DisparityPicture::new(disparity, width);
@@ -232,7 +232,7 @@ impl<
             exposures,
             came_again: self.recent_pictures.came_again(&exposures),
             content: self.content_signs,
-            picture: DisparityPicture::new(&self.disparity[..width * height], width),
+            picture: picture_of(&self.disparity, width, height),
             statistics: &self.detection.statistics,
             ground: self.detection.ground.as_ref(),
             exchanged,
@@ -264,13 +264,14 @@ impl<
         let range = SearchRange { first, last: first + usize::from(disparities).saturating_sub(1) };
         self.content.begin(width, height, range);
         let [left_row, right_row] = &mut self.rows;
+        let left_row = left_row.get_mut(..width).unwrap_or_default();
+        let right_row = right_row.get_mut(..width).unwrap_or_default();
         let mut next = 0;
         for y in 0..height {
             probe.enter(Stage::Rectify);
-            let left_span = self.rectifier.row(Side::Left, left, y, &mut left_row[..width]);
-            let right_span = self.rectifier.row(Side::Right, right, y, &mut right_row[..width]);
+            let left_span = self.rectifier.row(Side::Left, left, y, left_row);
+            let right_span = self.rectifier.row(Side::Right, right, y, right_row);
             probe.enter(Stage::Match);
-            let (left_row, right_row) = (&left_row[..width], &right_row[..width]);
             let spans = [ValidSpan::from(left_span), ValidSpan::from(right_span)];
             self.matcher.push(left_row, right_row, spans[0], spans[1]);
             while let Some(out) = self.disparity.get_mut(next * width..(next + 1) * width) {
@@ -291,7 +292,8 @@ impl<
     /// The matching of `EXCHANGE_ROWS x (window + 2)` rows.
     fn matches_exchanged(&mut self, left: &Picture<'_>, right: &Picture<'_>, width: usize, height: usize) -> bool {
         let [left_row, right_row] = &mut self.rows;
-        let (left_row, right_row) = (&mut left_row[..width], &mut right_row[..width]);
+        let left_row = left_row.get_mut(..width).unwrap_or_default();
+        let right_row = right_row.get_mut(..width).unwrap_or_default();
         // The first row that is not at the border of the picture is complete when this many have come.
         let [_, margin] = self.matcher.settings().margins();
         let needed = 2 * margin + 1;
@@ -304,7 +306,7 @@ impl<
                 let right_span = self.rectifier.row(Side::Right, left, y.min(height - 1), right_row);
                 self.matcher.push(left_row, right_row, ValidSpan::from(left_span), ValidSpan::from(right_span));
             }
-            let row = &mut self.probe_row[..width];
+            let row = self.probe_row.get_mut(..width).unwrap_or_default();
             if self.matcher.pull(margin, row) {
                 matched += row.iter().filter(|pixel| pixel.has_value()).count();
             }
@@ -326,7 +328,7 @@ impl<
     pub fn disparity(&self) -> DisparityPicture<'_> {
         let (width, height) =
             self.setup.map_or((0, 0), |setup| (setup.pair.width as usize, setup.pair.height as usize));
-        DisparityPicture::new(&self.disparity[..width * height], width)
+        picture_of(&self.disparity, width, height)
     }
 
     /// The rectified pair; `None` before [`Self::configure`].
@@ -378,6 +380,11 @@ impl<
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// The first pixels as a picture; the matcher has seen that they suffice.
+fn picture_of(pixels: &[DisparityPixel], width: usize, height: usize) -> DisparityPicture<'_> {
+    DisparityPicture::new(pixels.get(..width.saturating_mul(height)).unwrap_or_default(), width)
 }
 
 #[cfg(test)]

@@ -38,22 +38,25 @@ impl PlaneSums {
     /// Adds a pixel.
     pub(super) fn add(&mut self, u: i32, v: i32, steps: u16) {
         let (u, v, d) = (i64::from(u), i64::from(v), i64::from(steps));
-        self.n += 1;
-        self.u += u;
-        self.v += v;
-        self.d += d;
-        self.uu += u * u;
-        self.uv += u * v;
-        self.vv += v * v;
-        self.ud += u * d;
-        self.vd += v * d;
-        self.dd += d * d;
+        // Pictures of 2^16 x 2^16 pixels, and disparities of 2^15 steps, stay below 2^63.
+        let add = |sum: &mut i64, more: i64| *sum = sum.wrapping_add(more);
+        let product = i64::wrapping_mul;
+        add(&mut self.n, 1);
+        add(&mut self.u, u);
+        add(&mut self.v, v);
+        add(&mut self.d, d);
+        add(&mut self.uu, product(u, u));
+        add(&mut self.uv, product(u, v));
+        add(&mut self.vv, product(v, v));
+        add(&mut self.ud, product(u, d));
+        add(&mut self.vd, product(v, d));
+        add(&mut self.dd, product(d, d));
     }
 
     /// The plane with the least squares of the differences of disparity, and their mean; `None` where the pixels lie on a line.
     pub(super) fn fit(&self) -> Option<(DisparityPlane, f32)> {
         let Self { n, u, v, d, uu, uv, vv, ud, vd, dd } = *self;
-        let central = |sum: i64, a: i64, b: i64| (n * sum - a * b) as f32;
+        let central = |sum: i64, a: i64, b: i64| n.wrapping_mul(sum).wrapping_sub(a.wrapping_mul(b)) as f32;
         let (cuu, cuv, cvv) = (central(uu, u, u), central(uv, u, v), central(vv, v, v));
         let (cud, cvd, cdd) = (central(ud, u, d), central(vd, v, d), central(dd, d, d));
         let determinant = cuu * cvv - cuv * cuv;

@@ -87,7 +87,10 @@ impl GroundDeviation {
         self.pair = Some((*pair, *frame));
         self.height_known = height_known;
         let (width, height) = (pair.width as usize, pair.height as usize);
-        let fits = |stride: &usize| width.div_ceil(*stride) * height.div_ceil(*stride) <= usize::from(settings.samples);
+        let along = |length: usize, stride: &usize| length.div_ceil((*stride).max(1));
+        let fits = |stride: &usize| {
+            along(width, stride).saturating_mul(along(height, stride)) <= usize::from(settings.samples)
+        };
         self.stride = (1..=width.max(height).max(1)).find(fits).unwrap_or(1);
         Ok(())
     }
@@ -104,7 +107,7 @@ impl GroundDeviation {
                 return;
             }
             let near = |&(u, v, steps): &(i32, i32, u16)| off(&plane, u, v, steps).abs() <= tolerance;
-            let support = self.samples(picture).filter(near).count() as u32;
+            let support = self.samples(picture).filter(near).fold(0u32, |support, _| support.saturating_add(1));
             if best.is_none_or(|(most, _)| support > most) {
                 best = Some((support, plane));
             }
@@ -199,9 +202,11 @@ impl GroundDeviation {
     fn samples<'a>(&self, picture: DisparityPicture<'a>) -> impl Iterator<Item = (i32, i32, u16)> + use<'a> {
         let (stride, (u0, v0)) = (self.stride.max(1), whole_centre(picture));
         (stride / 2..picture.height()).step_by(stride).flat_map(move |y| {
-            let row = picture.row(y).iter().enumerate().skip(stride / 2).step_by(stride);
-            row.filter(|(_, pixel)| pixel.has_value())
-                .map(move |(x, pixel)| (x as i32 - u0, y as i32 - v0, pixel.steps()))
+            let row = picture.row(y);
+            (stride / 2..row.len()).step_by(stride).filter_map(move |x| {
+                let pixel = row.get(x).filter(|pixel| pixel.has_value())?;
+                Some((from_centre(x, u0), from_centre(y, v0), pixel.steps()))
+            })
         })
     }
 
@@ -211,7 +216,7 @@ impl GroundDeviation {
         for _ in 0..TRIES {
             let (x, y) = (random.below(picture.width()), random.below(picture.height()));
             if let Some(pixel) = picture.row(y).get(x).filter(|pixel| pixel.has_value()) {
-                return Some((x as i32 - u0, y as i32 - v0, pixel.steps()));
+                return Some((from_centre(x, u0), from_centre(y, v0), pixel.steps()));
             }
         }
         None
@@ -233,6 +238,11 @@ fn whole_centre(picture: DisparityPicture<'_>) -> (i32, i32) {
     ((picture.width() / 2) as i32, (picture.height() / 2) as i32)
 }
 
+/// A column or row counted from the centre; pictures have at most 2^31 of either.
+const fn from_centre(at: usize, centre: i32) -> i32 {
+    (at as i32).wrapping_sub(centre)
+}
+
 /// How far a disparity lies off a plane, 1/16 px.
 fn off(plane: &DisparityPlane, u: i32, v: i32, steps: u16) -> f32 {
     f32::from(steps) - plane.steps_at(u as f32, v as f32)
@@ -252,7 +262,7 @@ fn rms_m(
     let (mut n, mut sum) = (0u32, 0.0_f32);
     for (_, _, steps) in samples.filter(|&(u, v, steps)| off(plane, u, v, steps).abs() <= tolerance) {
         let share = noise_steps / (f32::from(steps) + offset).max(1.0);
-        n += 1;
+        n = n.saturating_add(1);
         sum += share * share;
     }
     camera_height_m * libm::sqrtf(sum / n.max(1) as f32)
@@ -269,7 +279,7 @@ impl Choice {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^= z >> 31;
-        (((z >> 32) * n as u64) >> 32) as usize
+        ((z >> 32).wrapping_mul(n as u64) >> 32) as usize
     }
 }
 

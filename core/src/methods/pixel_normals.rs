@@ -106,8 +106,9 @@ impl<const WIDTH: usize> PixelNormals<WIDTH> {
         let least = i64::from((area * u32::from(self.settings.min_filled_percent)).div_ceil(100).max(3));
         let most_squares = 256.0 * self.settings.max_rms_px * self.settings.max_rms_px;
         for (y, codes) in (0..picture.height()).zip(codes.chunks_exact_mut(picture.width().max(1))) {
-            move_columns(&mut self.columns[..width], y, radius, steps);
-            let row = picture.row(y).iter().zip(windows(&self.columns[..width], radius));
+            move_columns(self.columns.get_mut(..width).unwrap_or_default(), y, radius, steps);
+            let columns = self.columns.get(..width).unwrap_or_default();
+            let row = picture.row(y).iter().zip(windows(columns, radius));
             for ((x, (pixel, sums)), code) in row.enumerate().zip(codes) {
                 *code = NONE;
                 if steps_of(pixel) == 0 || sums.n < least {

@@ -64,7 +64,7 @@ impl SymmetricMatrix3 {
         }
         // A power of two scales without rounding, subnormal entries too.
         let exponent = libm::ilogbf(magnitude);
-        let mut eigen = solve(&self.scaled(-exponent));
+        let mut eigen = solve(&self.scaled(exponent.saturating_neg()));
         for value in &mut eigen.values {
             *value = libm::ldexpf(*value, exponent).clamp(-f32::MAX, f32::MAX);
         }

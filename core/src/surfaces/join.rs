@@ -90,8 +90,9 @@ impl<const SURFACES: usize> Regions<SURFACES> {
 
     /// The regions, each by the surface that stands for it. Surfaces that took no part are regions of their own.
     pub fn roots(&self) -> impl Iterator<Item = usize> {
-        self.parent[..self.len]
+        self.parent
             .iter()
+            .take(self.len)
             .enumerate()
             .filter(|&(place, &parent)| usize::from(parent) == place)
             .map(|(place, _)| place)
@@ -109,16 +110,20 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         self.len = len.min(SURFACES);
         for place in (0..self.len).rev() {
             let root = self.root(place);
-            self.parent[place] = root as u16;
-            self.next[place] = place as u16;
+            if let (Some(parent), Some(next)) = (self.parent.get_mut(place), self.next.get_mut(place)) {
+                (*parent, *next) = (root as u16, place as u16);
+            }
         }
         // A root is the first of its region, so everything can be hung in right behind it, from the end on.
         for place in (0..self.len).rev() {
-            let root = usize::from(self.parent[place]);
-            if root != place {
-                let behind = self.next[root];
-                self.next[place] = if usize::from(behind) == root { place as u16 } else { behind };
-                self.next[root] = place as u16;
+            let Some(root) = self.parent.get(place).map(|&root| usize::from(root)).filter(|&root| root != place) else {
+                continue;
+            };
+            let Some(behind) = self.next.get_mut(root).map(|next| core::mem::replace(next, place as u16)) else {
+                continue;
+            };
+            if let Some(next) = self.next.get_mut(place) {
+                *next = if usize::from(behind) == root { place as u16 } else { behind };
             }
         }
     }
@@ -130,8 +135,12 @@ impl<const SURFACES: usize> Regions<SURFACES> {
             if parent == place {
                 break;
             }
-            self.parent[place] = self.parent[parent];
-            place = usize::from(self.parent[place]);
+            // Every other one is hung one higher on the way, so that the next way is half as long.
+            let Some(&above) = self.parent.get(parent) else { break };
+            if let Some(halved) = self.parent.get_mut(place) {
+                *halved = above;
+            }
+            place = usize::from(above);
         }
         place
     }

@@ -155,7 +155,7 @@ fn encode(
     let room = out.capacity().saturating_sub(out.len()).checked_sub(FIXED_FRAMES_PER_SCAN).ok_or(OutputFull)?;
     let runs_per_frame = config.format().runs_per_frame();
     let max_frames = room.min(usize::from(config.max_cell_frames()));
-    let selection = select(scan.geometry, scan.cells, max_frames * runs_per_frame, runs);
+    let selection = select(scan.geometry, scan.cells, max_frames.saturating_mul(runs_per_frame), runs);
     let frame_count = runs.len().div_ceil(runs_per_frame);
 
     let first = out.len();
@@ -176,8 +176,8 @@ fn encode(
         FrameFormat::Fd => Message::CellsFd,
     };
     let mut scan_crc = ScanCrc::START;
-    for (k, chunk) in runs.chunks(runs_per_frame).enumerate() {
-        let mut cells = CellsRepr { scan_low, sequence: k as u8 & 0xF, runs: [None; CellsRepr::FD_RUNS] };
+    for (chunk, sequence) in runs.chunks(runs_per_frame).zip((0..=0xF).cycle()) {
+        let mut cells = CellsRepr { scan_low, sequence, runs: [None; CellsRepr::FD_RUNS] };
         cells.runs.iter_mut().zip(chunk).for_each(|(to, run)| *to = Some(*run));
         let frame = counters.frame(message, |data| cells.emit(data));
         scan_crc.add(frame.data().get(2..).unwrap_or(&[]));
@@ -197,7 +197,11 @@ fn encode(
     };
     add(counters.frame(Message::End, |data| end.emit(data)))?;
 
-    Ok(EncodeReport { frames: out.len() - first, cells: selection.cells, dropped_cells: selection.dropped })
+    Ok(EncodeReport {
+        frames: out.len().saturating_sub(first),
+        cells: selection.cells,
+        dropped_cells: selection.dropped,
+    })
 }
 
 impl core::fmt::Display for OutputFull {

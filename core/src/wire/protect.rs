@@ -121,7 +121,7 @@ pub fn protect(data_id: u16, counter: u8, data: &mut [u8]) {
 
 /// The counter after `counter`.
 pub const fn next_counter(counter: u8) -> u8 {
-    if counter + 1 >= COUNTER_VALUES { 0 } else { counter + 1 }
+    if counter >= COUNTER_VALUES - 1 { 0 } else { counter + 1 }
 }
 
 /// CRC of profile 11. The profile calls the routine with a start value of 0xFF, which the routine takes as "not the first

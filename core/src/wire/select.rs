@@ -31,7 +31,7 @@ pub(super) fn select(geometry: &MapGeometry, cells: &[Cell], limit: usize, runs:
 
     let columns = usize::from(geometry.y_count).max(1);
     let rows = usize::from(if geometry.y_count == 0 { 0 } else { geometry.x_count });
-    for (a, row) in cells.chunks(columns).take(rows).enumerate() {
+    for (row, a) in cells.chunks(columns).zip(0..rows) {
         let i = index(geometry.x_first, a);
         let mut open: Option<Run> = None;
         for (b, cell) in row.iter().enumerate() {
@@ -59,7 +59,7 @@ pub(super) fn select(geometry: &MapGeometry, cells: &[Cell], limit: usize, runs:
 
     sort(runs);
     let mut selection = Selection { cells: 0, dropped: dropped.saturating_add(unsendable) };
-    let mut total: u32 = runs.iter().map(|run| u32::from(run.length)).sum();
+    let mut total = runs.iter().fold(0u32, |total, run| total.saturating_add(u32::from(run.length)));
     while total > HeaderRepr::CELL_COUNT.max() {
         let length = runs.pop().map_or(0, |run| u32::from(run.length));
         total = total.saturating_sub(length);
@@ -77,11 +77,12 @@ fn index(first: i16, offset: usize) -> Option<i8> {
 
 /// Adds `run` to the heap, or exchanges the root for it if that has a higher rank. Returns how many cells fell out.
 fn insert(heap: &mut VecView<Run, u16>, limit: usize, run: Run) -> u32 {
-    if heap.len() < limit {
+    // The list counts in 16 bits.
+    if heap.len() < limit.min(usize::from(u16::MAX)) {
         if heap.push(run).is_err() {
             return u32::from(run.length);
         }
-        let last = heap.len() - 1;
+        let last = heap.len().saturating_sub(1);
         sift_up(heap, last);
         return 0;
     }
@@ -118,8 +119,9 @@ fn sift_up(heap: &mut [Run], mut child: usize) {
 
 fn sift_down(heap: &mut [Run], mut parent: usize) {
     loop {
-        let left = 2 * parent + 1;
-        let child = if is_higher(heap, left + 1, left) { left + 1 } else { left };
+        let left = parent.saturating_mul(2).saturating_add(1);
+        let right = left.saturating_add(1);
+        let child = if is_higher(heap, right, left) { right } else { left };
         if !is_higher(heap, child, parent) {
             return;
         }

@@ -11,6 +11,9 @@ pub struct Signal {
     pub size: u8,
 }
 
+/// Where the bytes of a word lie in it.
+const BYTES: [u32; 4] = [0, 8, 16, 24];
+
 impl Signal {
     /// A signal of `size` bits from bit `start`.
     pub const fn new(start: u8, size: u8) -> Self {
@@ -20,17 +23,20 @@ impl Signal {
 
     /// Largest unsigned value.
     pub const fn max(self) -> u32 {
-        (1 << self.size) - 1
+        match 1u32.checked_shl(self.size as u32) {
+            Some(next) => next.wrapping_sub(1),
+            None => u32::MAX,
+        }
     }
 
     /// Largest signed value.
     pub const fn max_signed(self) -> i32 {
-        (1 << (self.size - 1)) - 1
+        (self.max() >> 1) as i32
     }
 
     /// Smallest signed value.
     pub const fn min_signed(self) -> i32 {
-        -(1 << (self.size - 1))
+        -self.max_signed() - 1
     }
 
     /// The same signal `bits` further on.
@@ -45,15 +51,15 @@ impl Signal {
     pub fn get(self, data: &[u8]) -> u32 {
         let first = usize::from(self.start / 8);
         let mut word = 0;
-        for (i, byte) in data.iter().skip(first).take(4).enumerate() {
-            word |= u32::from(*byte) << (8 * i);
+        for (byte, at) in data.get(first..).unwrap_or_default().iter().zip(BYTES) {
+            word |= u32::from(*byte) << at;
         }
         (word >> (self.start % 8)) & self.max()
     }
 
     /// Reads the signal as a two's complement number.
     pub fn get_signed(self, data: &[u8]) -> i32 {
-        let unused = 32 - u32::from(self.size);
+        let unused = 32u32.saturating_sub(u32::from(self.size)).min(31);
         ((self.get(data) << unused) as i32) >> unused
     }
 
@@ -74,8 +80,8 @@ impl Signal {
         let first = usize::from(self.start / 8);
         let shift = self.start % 8;
         let (mask, bits) = (self.max() << shift, bits << shift);
-        for (i, byte) in data.iter_mut().skip(first).take(4).enumerate() {
-            *byte = (*byte & !((mask >> (8 * i)) as u8)) | (bits >> (8 * i)) as u8;
+        for (byte, at) in data.get_mut(first..).unwrap_or_default().iter_mut().zip(BYTES) {
+            *byte = (*byte & !((mask >> at) as u8)) | (bits >> at) as u8;
         }
     }
 }

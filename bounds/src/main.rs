@@ -1,0 +1,94 @@
+//! What Fencepost takes at most, as numbers: memory, bus and stack, held against a budget. See `docs/bounds.md`.
+#![deny(unsafe_code)]
+
+mod budget;
+mod bus;
+mod figures;
+mod image;
+mod memory;
+mod report;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use anyhow::Result;
+use clap::{Args, Parser, Subcommand};
+
+use figures::Figures;
+
+/// What Fencepost takes at most of memory, bus and stack.
+#[derive(Parser)]
+#[command(name = "fencepost-bounds", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Prints everything that is known.
+    Report {
+        #[command(flatten)]
+        images: Images,
+    },
+    /// Compares with the budget; the exit status is 1 if a row is over it.
+    Check {
+        #[command(flatten)]
+        images: Images,
+        /// The budget.
+        #[arg(long, default_value = "bounds/budget.toml")]
+        budget: PathBuf,
+    },
+    /// Prints a budget that is what is found now.
+    Budget {
+        #[command(flatten)]
+        images: Images,
+        /// The budget whose limits are kept.
+        #[arg(long, default_value = "bounds/budget.toml")]
+        budget: PathBuf,
+    },
+}
+
+/// Images for thumbv7em-none-eabihf that `bounds/entries/build` has made. What is not given is not looked at, and said.
+#[derive(Args)]
+struct Images {
+    /// The image of the profile `release`: stack, memory on the microcontroller, allocators.
+    #[arg(long)]
+    image: Option<PathBuf>,
+    /// The image of the profile `checked`: panics.
+    #[arg(long)]
+    checked: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Cli::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Says whether everything is as it must be.
+fn run(cli: &Cli) -> Result<bool> {
+    let of = |images: &Images| Figures::find(images.image.as_deref(), images.checked.as_deref());
+    match &cli.command {
+        Command::Report { images } => {
+            let figures = of(images)?;
+            print!("{}", report::text(&figures));
+            Ok(figures.faults.is_empty())
+        }
+        Command::Check { images, budget } => {
+            let budget = budget::Budget::read(budget)?;
+            let findings = budget.compare(&of(images)?);
+            print!("{findings}");
+            Ok(findings.are_good())
+        }
+        Command::Budget { images, budget } => {
+            let limits = budget::Budget::read(budget)?.limits;
+            print!("{}", budget::Budget::of(&of(images)?, limits).to_toml()?);
+            Ok(true)
+        }
+    }
+}
