@@ -88,8 +88,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         available
     }
 
-    /// The backend in use: slower than the one that was asked for where tables have no room for its vectors, and plain Rust for
-    /// absolute differences.
+    /// The backend in use: slower than the one that was asked for where tables have no room for its vectors or half as wide ones do
+    /// with fewer places, and plain Rust for absolute differences.
     pub const fn backend(&self) -> Backend {
         self.plan.chosen.backend()
     }

@@ -17,12 +17,16 @@ pub(super) struct Plan {
     pub(super) key_disparity: u16,
 }
 
+/// Places of a column that may be there only to fill a vector, less than this many.
+const MOST_PADDING: usize = 32;
+
 impl Plan {
     pub(super) const UNSET: Self = Self { chosen: Chosen::PLAIN, stride: 0, keys: false, lead: 0, key_disparity: 0 };
 
     /// The plan for `settings`, which were checked, for pictures of `width` in tables for up to `WIDTH` and `DISPARITIES`.
     ///
-    /// Tables are padded for vectors; where there is no room for that the next slower backend serves, plain Rust at last.
+    /// Tables are padded for vectors; where there is no room for that, or too much of it, the next slower backend serves, plain Rust at
+    /// last.
     pub(super) fn new<const WIDTH: usize, const DISPARITIES: usize>(
         backend: Backend,
         settings: &MatchSettings,
@@ -39,7 +43,9 @@ impl Plan {
         let mut backend = if settings.cost == MatchCost::Census { backend } else { Backend::Plain };
         while backend != Backend::Plain {
             let stride = disparities.next_multiple_of(backend.lanes());
+            // What half as wide a vector would do without is no gain.
             let room = backend.takes(disparities)
+                && stride - disparities < MOST_PADDING
                 && width * stride <= WIDTH * DISPARITIES * 2
                 && back <= LEAD_ROWS * WIDTH
                 && width + stride <= WIDTH + WIDTH / 2

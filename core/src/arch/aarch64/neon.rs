@@ -50,14 +50,13 @@ impl Vector for Neon {
         }
     }
 
-    /// 128 is no number of 8 bits with a sign, but -128 is.
     #[inline(always)]
     unsafe fn add_shifted(self, to: [Words; 2]) -> [Words; 2] {
         // SAFETY: the caller guarantees the instructions.
         unsafe {
-            let (bytes, times) = (vreinterpretq_s8_u8(self.0), vdupq_n_s8(-128));
-            let low = vmlsl_s8(to[0].0, vget_low_s8(bytes), vget_low_s8(times));
-            [Words(low), Words(vmlsl_high_s8(to[1].0, bytes, times))]
+            let bytes = vreinterpretq_s8_u8(self.0);
+            let [low, high] = [vshll_n_s8::<7>(vget_low_s8(bytes)), vshll_high_n_s8::<7>(bytes)];
+            [to[0].add(Words(low)), to[1].add(Words(high))]
         }
     }
 }

@@ -175,7 +175,10 @@ fn the_usual_sizes_need_no_slower_backend() {
         for matcher in &mut runner.others {
             let settings = MatchSettings { disparities, ..MatchSettings::DEFAULT };
             matcher.configure(&settings, width, 100).unwrap();
-            assert_eq!(matcher.backend(), matcher.backend, "{width} {disparities}");
+            // 96 disparities are three vectors of 32 bytes, but one and a half of 64.
+            let half = matcher.backend == Backend::Avx512 && disparities == 96;
+            let expected = if half { Backend::Avx2 } else { matcher.backend };
+            assert_eq!(matcher.backend(), expected, "{width} {disparities}");
         }
     }
 }
