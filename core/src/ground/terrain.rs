@@ -162,7 +162,7 @@ impl Terrain {
         if ahead < 0.0 || across < 0.0 || ahead >= AHEAD as f32 || across >= ACROSS as f32 {
             return;
         }
-        let (i, j) = (ahead as usize, across as usize);
+        let (i, j) = (ahead as i32 as usize, across as i32 as usize);
         let height_m = self.plane.height_m(point);
         let tolerance_m = bend.tolerance_m + bend.tolerance_per_m * point[0];
         let accepted = match round {
