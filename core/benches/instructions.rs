@@ -12,9 +12,9 @@ use gungraun::{library_benchmark, library_benchmark_group, main};
 
 /// Each stage once. What was prepared is handed back: setting free what it holds is not counted.
 macro_rules! stage {
-    ($name:ident, $run:ident) => {
+    ($name:ident, $run:ident, $pictures:expr) => {
         #[library_benchmark]
-        #[bench::trail(Stages::new())]
+        #[bench::once($pictures)]
         fn $name(mut stages: Stages) -> Stages {
             black_box(stages.$run());
             stages
@@ -22,11 +22,17 @@ macro_rules! stage {
     };
 }
 
-stage!(rectify, rectify);
-stage!(matching, match_rows);
-stage!(validate, validate);
-stage!(surfaces, surfaces);
-stage!(detect, detect);
+stage!(rectify, rectify, Stages::new());
+stage!(matching, match_rows, Stages::new());
+stage!(validate, validate, Stages::new());
+stage!(surfaces, surfaces, Stages::new());
+stage!(detect, detect, Stages::new());
+// Pictures that are made to cost much.
+stage!(matching_noise, match_rows, Stages::noise());
+stage!(detect_noise, detect, Stages::noise());
+stage!(matching_blocks, match_rows, Stages::blocks());
+stage!(detect_blocks, detect, Stages::blocks());
 
 library_benchmark_group!(name = stages, benchmarks = [rectify, matching, validate, surfaces, detect]);
-main!(library_benchmark_groups = stages);
+library_benchmark_group!(name = worst, benchmarks = [matching_noise, detect_noise, matching_blocks, detect_blocks]);
+main!(library_benchmark_groups = stages, worst);

@@ -239,7 +239,7 @@ impl Terrain {
             let (ahead, across) = ((ahead - 0.5).clamp(0.0, most_ahead), (across - 0.5).clamp(0.0, most_across));
             let (i, j) = (floor(ahead, 0.0, most_ahead - 1.0), floor(across, 0.0, most_across - 1.0));
             parts[k] = [ahead - i as f32, across - j as f32];
-            corners[k] = i * ACROSS as i32 + j;
+            corners[k] = i.wrapping_mul(ACROSS as i32).wrapping_add(j);
         }
         // The four patches around each place, one after the other: no vector instruction of all processors does it.
         let lift_m = self.lift_m.as_flattened();

@@ -214,8 +214,8 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             y[k] = origin[1] + z[k] * (row.direction[1] + along * step[1]);
             above_plane[k] = row.camera_height_m + z[k] * (row.climb + along * row.climb_step);
             let [ahead, aside] = view.place.to_vehicle([x[k], y[k]]);
-            let i = floor(ahead * per_cell, -32768.0, 32767.0) - i32::from(x_first);
-            let j = floor(aside * per_cell, -32768.0, 32767.0) - i32::from(y_first);
+            let i = floor(ahead * per_cell, -32768.0, 32767.0).wrapping_sub(i32::from(x_first));
+            let j = floor(aside * per_cell, -32768.0, 32767.0).wrapping_sub(i32::from(y_first));
             let inside = (i as u32) < u32::from(x_count) && (j as u32) < u32::from(y_count) && known & 1 << k != 0;
             cells[k] = if inside { i.wrapping_mul(i32::from(y_count)).wrapping_add(j) } else { -1 };
             any |= !cells[k];
