@@ -27,6 +27,9 @@ pub(crate) struct Links {
 }
 
 impl Links {
+    /// Of pixels without a value.
+    pub(crate) const NONE: Self = Self { value: 0, left: 0 };
+
     /// The links of `piece`; `before` is the pixel to the left of it, 0 if there is none.
     #[inline(always)]
     pub(crate) fn of(piece: &Piece, before: u16, values: &Range<u16>, step: u16) -> Self {

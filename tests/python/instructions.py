@@ -9,6 +9,9 @@ import sys
 
 TOLERANCE = 0.03
 
+# What all stages but the matching cost at most on pictures that are made to cost much, against those of a trail.
+WORST = 1.3
+
 
 def counts(text):
     """Instructions by benchmark, from JSON values one after the other."""
@@ -61,6 +64,12 @@ def main():
         bad = not abs(change) <= TOLERANCE
         wrong |= bad
         print(f"   {name:10} {new} instructions, golden {old}, {100 * change:+.1f} %{'  WRONG' if bad else ''}")
+    beside = {name: found.get(f"detect{name}", 0) - found.get(f"matching{name}", 0) for name in ("", "_noise", "_blocks")}
+    for name in ("_noise", "_blocks"):
+        ratio = beside[name] / max(beside[""], 1)
+        bad = not 0 < ratio <= WORST
+        wrong |= bad
+        print(f"   all but the matching, {name[1:]:6} {ratio:.2f} of the trail's, limit {WORST}{'  WRONG' if bad else ''}")
     if wrong:
         sys.exit("BLESS=1 tests/instructions writes them anew: look at the difference, and commit it with what caused it")
 

@@ -63,11 +63,33 @@ impl Stages {
 
     /// The same with a backend that the processor has.
     pub(crate) fn with(backend: Backend) -> Self {
+        Self::of(["image_0", "image_1"].map(|folder| picture(folder, 0)), backend)
+    }
+
+    /// Ready for pictures that show nothing but noise: disparities are many small surfaces.
+    #[allow(dead_code, reason = "instructions are counted, times of made-up pictures tell nothing")]
+    pub(crate) fn noise() -> Self {
+        Self::of([noise(1), noise(2)], Backend::fastest())
+    }
+
+    /// Ready for pictures in which every block of 12 x 12 pixels lies at a distance of its own: as many surfaces as fit.
+    #[allow(dead_code, reason = "as above")]
+    pub(crate) fn blocks() -> Self {
+        let right = noise(3);
+        let from = |i: usize| {
+            let (x, y) = (i % WIDTH, i / WIDTH);
+            let disparity = 6 + (x / 12 * 5 + y / 12 * 3) % 8 * 4;
+            right[y * WIDTH + x.saturating_sub(disparity)]
+        };
+        Self::of([(0..WIDTH * HEIGHT).map(from).collect(), right.clone()], Backend::fastest())
+    }
+
+    fn of(pictures: [Vec<u8>; 2], backend: Backend) -> Self {
         let matching = MatchSettings { disparities: DISPARITIES as u16, ..MatchSettings::DEFAULT };
         let settings = Settings { matching, ..Settings::default() };
         let frame = VehicleFrame::new(&MOUNT).unwrap();
         let mut stages = Self {
-            pictures: ["image_0", "image_1"].map(|folder| picture(folder, 0)),
+            pictures,
             detector: Box::default(),
             rectifier: Box::default(),
             matcher: Box::default(),
@@ -151,6 +173,18 @@ pub(crate) fn picture(folder: &str, number: usize) -> Vec<u8> {
     let mut pixels = vec![0; WIDTH * HEIGHT];
     reader.next_frame(&mut pixels).unwrap();
     pixels
+}
+
+/// Grey values without any order: xorshift (Marsaglia, 2003).
+fn noise(seed: u32) -> Vec<u8> {
+    let mut state = seed;
+    let next = || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        (state >> 24) as u8
+    };
+    std::iter::repeat_with(next).take(WIDTH * HEIGHT).collect()
 }
 
 /// A pair behind lenses.

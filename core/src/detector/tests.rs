@@ -256,6 +256,48 @@ fn what_is_told_is_released_by_count_after_forgetting() {
 }
 
 #[test]
+fn every_backend_finds_the_same() {
+    const IDENTITY: [[f32; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let distortion = Distortion([-0.05, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let camera = CameraModel {
+        width: PAIR.width,
+        height: PAIR.height,
+        fx: PAIR.focal_px,
+        fy: PAIR.focal_px,
+        cx: PAIR.cx,
+        cy: PAIR.cy,
+        distortion,
+    };
+    let raw = StereoCalibration::Raw(RawPair {
+        left: camera,
+        right: camera,
+        rotation: IDENTITY,
+        translation_m: [-PAIR.baseline_m, 0.0, 0.0],
+        rectification: Some(Rectification { left_rotation: IDENTITY, right_rotation: IDENTITY, pair: PAIR }),
+    });
+    let mut random = Random::seeded("pictures for every backend", 0x5eed_020a);
+    let mut pairs = vec![good_pair(4), good_pair(5)];
+    pairs.extend((0..6).map(|_| garbage(&mut random)));
+    for calibration in [StereoCalibration::Rectified(PAIR), raw] {
+        let found = |backend: Backend| -> Option<Vec<String>> {
+            let mut detector = Box::new(Small::new());
+            detector.set_backend(backend).then(|| {
+                detector.configure(&settings(), &calibration, &MOUNT).unwrap();
+                pairs.iter().map(|pair| look(&mut detector, pair)).collect()
+            })
+        };
+        let plain = found(Backend::Plain).unwrap();
+        assert!(plain[0].contains("state: Free"), "the stages have something to find");
+        for &backend in Backend::ALL {
+            match found(backend) {
+                Some(texts) => assert!(texts == plain, "{} finds something else than plain Rust", backend.name()),
+                None => std::println!("NOT RUN: this processor has no {}", backend.name()),
+            }
+        }
+    }
+}
+
+#[test]
 fn the_same_frame_gives_the_same_bytes_again() {
     let good = good_pair(3);
     let mut detector = configured();

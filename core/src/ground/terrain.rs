@@ -166,7 +166,7 @@ impl Terrain {
         if ahead < 0.0 || across < 0.0 || ahead >= AHEAD as f32 || across >= ACROSS as f32 {
             return;
         }
-        let (i, j) = (ahead as usize, across as usize);
+        let (i, j) = (ahead as i32 as usize, across as i32 as usize);
         let height_m = self.plane.height_m(point);
         let tolerance_m = bend.tolerance_m + bend.tolerance_per_m * point[0];
         let accepted = match round {
@@ -243,7 +243,7 @@ impl Terrain {
             let (ahead, across) = ((ahead - 0.5).clamp(0.0, most_ahead), (across - 0.5).clamp(0.0, most_across));
             let (i, j) = (floor(ahead, 0.0, most_ahead - 1.0), floor(across, 0.0, most_across - 1.0));
             parts[k] = [ahead - i as f32, across - j as f32];
-            corners[k] = i * ACROSS as i32 + j;
+            corners[k] = i.wrapping_mul(ACROSS as i32).wrapping_add(j);
         }
         // The four patches around each place, one after the other: no vector instruction of all processors does it.
         let lift_m = self.lift_m.as_flattened();

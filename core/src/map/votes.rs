@@ -178,10 +178,8 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             let [nx, ny, nz] = common.across;
             let drop = at(0) * nx + at(1) * ny + at(2) * nz;
             let noise = self.settings.height_noise_px * drop.abs() / focal_baseline_px_m;
-            // All that follow, as far as the next run: without a branch on where that is.
-            for (noise_per_m2, k) in noise_per_m2.iter_mut().zip(0..) {
-                *noise_per_m2 = if k >= first as i32 { noise } else { *noise_per_m2 };
-            }
+            // All that follow: the next run has its own.
+            noise_per_m2.get_mut(first as usize..).unwrap_or_default().fill(noise);
         }
         roles
     }
@@ -211,13 +209,13 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
         let (mut x, mut y, mut above_plane) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         let (mut cells, mut any) = ([0; LANES], 0);
         for k in 0..LANES {
-            let along = (first + k) as f32;
+            let along = (first + k) as i32 as f32;
             x[k] = origin[0] + z[k] * (row.direction[0] + along * step[0]);
             y[k] = origin[1] + z[k] * (row.direction[1] + along * step[1]);
             above_plane[k] = row.camera_height_m + z[k] * (row.climb + along * row.climb_step);
             let [ahead, aside] = view.place.to_vehicle([x[k], y[k]]);
-            let i = floor(ahead * per_cell, -32768.0, 32767.0) - i32::from(x_first);
-            let j = floor(aside * per_cell, -32768.0, 32767.0) - i32::from(y_first);
+            let i = floor(ahead * per_cell, -32768.0, 32767.0).wrapping_sub(i32::from(x_first));
+            let j = floor(aside * per_cell, -32768.0, 32767.0).wrapping_sub(i32::from(y_first));
             let inside = (i as u32) < u32::from(x_count) && (j as u32) < u32::from(y_count) && known & 1 << k != 0;
             cells[k] = if inside { i.wrapping_mul(i32::from(y_count)).wrapping_add(j) } else { -1 };
             any |= !cells[k];

@@ -144,28 +144,30 @@ impl<'a> Source<'a> {
             return false;
         }
         let last = STEP as i32 - 1;
-        let low: [i32; 2] = [0, 1].map(|i| start[i].min(start[i].wrapping_add(drift[i] * last)));
-        let right = start[0].wrapping_add(slope[0] * last);
+        let low: [i32; 2] = [0, 1].map(|i| start[i].min(start[i].wrapping_add(drift[i].wrapping_mul(last))));
+        let right = start[0].wrapping_add(slope[0].wrapping_mul(last));
         let [column, top] = low.map(|low| low >> PLACE_SHIFT);
         // Three rows are read, and of each row more than is used: at the lower edge that is left to others.
-        if low[0] < 0 || low[1] < 0 || right >= self.last[0] << PLACE_SHIFT || top + 2 > self.last[1] {
+        if low[0] < 0 || low[1] < 0 || right >= self.last[0] << PLACE_SHIFT || top.saturating_add(2) > self.last[1] {
             return false;
         }
         let bytes = self.data.get(top as usize * self.stride + column as usize..).unwrap_or_default();
-        let row = |down: usize| bytes.get(down * self.stride..).and_then(|rest| rest.first_chunk::<TILE_COLUMNS>());
+        let row = |down: usize| {
+            bytes.get(self.stride.saturating_mul(down)..).and_then(|rest| rest.first_chunk::<TILE_COLUMNS>())
+        };
         let (Some(first), Some(second), Some(third)) = (row(0), row(1), row(2)) else { return false };
         let rows = [first, second, third];
         // Weights of the three columns and rows of each pixel, from where it lies within two.
         let mut weights = [[[0u16; STEP]; 3]; 2];
         for i in 0..2 {
-            let from = (start[i] - (low[i] >> PLACE_SHIFT << PLACE_SHIFT)) as u16;
+            let from = start[i].wrapping_sub(low[i] >> PLACE_SHIFT << PLACE_SHIFT) as u16;
             let [first, second, third] = &mut weights[i];
             for k in 0..STEP {
                 let place = from.wrapping_add((drift[i] as u16).wrapping_mul(k as u16));
                 let along = place >> (PLACE_SHIFT - WEIGHT_SHIFT);
                 first[k] = WEIGHT_ONE.saturating_sub(along);
                 third[k] = along.saturating_sub(WEIGHT_ONE);
-                second[k] = WEIGHT_ONE - first[k] - third[k];
+                second[k] = WEIGHT_ONE.wrapping_sub(first[k]).wrapping_sub(third[k]);
             }
         }
         let [across, down] = &weights;

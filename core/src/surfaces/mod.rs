@@ -269,7 +269,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
 
     /// [`Self::labels_row`] of all rows, one after the other.
     pub(crate) fn labels(&self) -> &[u8] {
-        &self.labels[..self.width * self.height]
+        self.labels.get(..self.width.saturating_mul(self.height)).unwrap_or_default()
     }
 
     /// Place in the table of the first surface of the tile at `(x, y)`.

@@ -36,6 +36,8 @@ pub struct SurfaceSize<const WIDTH: usize> {
     /// Surfaces that reach the current row, and the number that each entry of the table has there.
     next: [Open; WIDTH],
     renumbered: [[u16; WIDTH]; 2],
+    /// How the first pixels of the row above hang together.
+    links: [Links; KEPT],
     walk: Vec<Step, MAX_SURFACE_PX>,
     chosen: Chosen,
 }
@@ -60,6 +62,9 @@ struct Step {
 
 const NONE: u16 = u16::MAX;
 
+/// Pieces of a row of which is kept how they hang together: those of 4096 pixels. Beyond, it is found out twice.
+const KEPT: usize = 128;
+
 const CLOSED: Open = Open { parent: 0, pixels: 0, seed: (0, 0) };
 
 impl<const WIDTH: usize> SurfaceSize<WIDTH> {
@@ -74,6 +79,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
             table: [[CLOSED; WIDTH]; 2],
             next: [CLOSED; WIDTH],
             renumbered: [[0; WIDTH]; 2],
+            links: [Links::NONE; KEPT],
             walk: Vec::new(),
             chosen: Chosen::PLAIN,
         }
@@ -123,7 +129,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
     /// many runs it has and how many entries of the table are used.
     #[inline(always)]
     fn join_row(&mut self, picture: &[DisparityPixel], y: usize, open: usize) -> (usize, usize) {
-        let Self { settings, width, above, here, table, .. } = self;
+        let Self { settings, width, above, here, table, links: kept, .. } = self;
         let ValidateSettings { step_sixteenths: step, min_surface_px: limit } = *settings;
         let row = picture.get(y * *width..(y + 1) * *width).unwrap_or_default();
         let before = y.checked_sub(1).and_then(|y| picture.get(y * *width..(y + 1) * *width));
@@ -137,7 +143,15 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
                 |row: &[DisparityPixel]| x.checked_sub(1).and_then(|x| row.get(x)).map_or(0, |pixel| pixel.bits());
             let (pixels, pixels_above) = (piece(row, x), piece(row_above, x));
             let links = Links::of(&pixels, last(row), &VALUES, step);
-            let links_above = Links::of(&pixels_above, last(row_above), &VALUES, step);
+            let links_above = match kept.get_mut(x / PIECE) {
+                // What was taken out of the picture since then does not reach the row above.
+                Some(kept) if y > 0 => core::mem::replace(kept, links),
+                Some(kept) => {
+                    *kept = links;
+                    Links::NONE
+                }
+                None => Links::of(&pixels_above, last(row_above), &VALUES, step),
+            };
             let (starts, starts_above) = (links.starts(), links_above.starts());
             let up = links.value & links_above.value & near(&pixels, &pixels_above, step);
             // Where both runs go on, so does what is known of them.
