@@ -128,6 +128,23 @@ impl Chosen {
     }
 }
 
+/// Writes census codes of as many pixels as the backend does better than plain Rust, from the first on, and says how many. `rows` are
+/// those three above the pixel, two above, its own, two below and three below, from three columns before the first pixel on.
+///
+/// # Bound
+/// One step for each pixel.
+#[inline(always)]
+pub(crate) fn census_codes(chosen: Chosen, rows: [&[u8]; 5], out: &mut [u8]) -> usize {
+    match chosen.0 {
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::census_codes(rows, out),
+        _ => {
+            let _ = (rows, out);
+            0
+        }
+    }
+}
+
 /// Lets a row of census codes into the sums of its columns and another one out.
 ///
 /// # Bound

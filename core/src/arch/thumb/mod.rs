@@ -6,13 +6,15 @@
 //! Four neighbouring places of a column are a word. Widened they are two words, of places 0 and 2 and of places 1 and 3, because
 //! that is what the instructions make of it; sums under the window are kept so.
 //!
-//! | step, for four disparities | instructions |
+//! | step, for four disparities unless told | instructions |
 //! | --- | --- |
+//! | census codes, for four pixels | 38 |
 //! | a row into and out of the column sums | 21, of which 4 are loads and stores |
 //! | sums under the window | 7 |
 //! | keys, and the least of them | 8 |
 //! | best left partner of each right pixel | 12 |
 
+mod census;
 mod search;
 mod slide;
 mod words;
@@ -22,6 +24,7 @@ use super::{
     plain,
 };
 
+pub(super) use census::census_codes;
 pub(super) use search::search_keys;
 pub(super) use slide::slide_codes;
 
