@@ -71,8 +71,8 @@ pub(in crate::arch) fn search_keys(
             let bound = above as u16 ^ 0x8000;
             let near = costs.near(&candidates, bound, bound >> 7);
             let place = usize::from((least & 0x7f) - costs.first_place);
-            let beside = [place.saturating_sub(1), place, place + 1].map(|place| number(costs.at(place)));
-            found.put(i, place, beside, near, above);
+            let [nearer, farther] = [place.saturating_sub(1), place + 1].map(|place| number(costs.at(place)));
+            found.put(i, place, [nearer, number(least >> 7), farther], near, above);
         }
     }
 }
@@ -96,8 +96,8 @@ pub(super) fn search_costs(search: &Search, columns: &[u8], work: &mut [i16], fo
             let bound = above as u16 ^ 0x8000;
             let near = costs.near(&candidates, bound, bound);
             let place = costs.first_of(candidates, least);
-            let beside = [place.saturating_sub(1), place, place + 1].map(|place| number(costs.at(place)));
-            found.put(i, place, beside, near, above);
+            let [nearer, farther] = [place.saturating_sub(1), place + 1].map(|place| number(costs.at(place)));
+            found.put(i, place, [nearer, number(least), farther], near, above);
         }
     }
 }
@@ -130,7 +130,7 @@ impl Costs {
         let blocks = stride / BLOCK;
         // Pairs of words are read at once, which wants them aligned.
         let first = PAD + work.as_ptr().align_offset(4);
-        let records = work.get_mut(first..first + 2 * RECORD * blocks)?.as_mut_ptr().cast::<u32>();
+        let records = work.get_mut(first..first + 2 * RECORD * blocks + 1)?.as_mut_ptr().cast::<u32>();
         let costs = Self { records, blocks, first_place: (MOST_PLACES - stride) as u16 };
         if !search.follows {
             // SAFETY: columns up to the first one's window and the costs were just seen to lie in the slices.
@@ -472,16 +472,26 @@ impl Costs {
         }
     }
 
-    /// The cost of a place; of the last one for those beyond.
+    /// The cost of a place; any number for the one behind the last.
     ///
     /// # Safety
-    /// That of [`Self::go_on`].
+    /// That of [`Self::go_on`], and that the place is not beyond that.
     #[inline(always)]
     unsafe fn at(&self, place: usize) -> u16 {
-        let place = place.min(BLOCK * self.blocks - 1);
-        // Of each four the middle ones are exchanged.
-        let half = place & 4 | (place & 1) << 1 | place >> 1 & 1;
-        // SAFETY: that of this function.
-        unsafe { *self.record(place / BLOCK).cast::<u16>().add(half) }
+        // SAFETY: the table has a number for each place and the one behind the last, for which `new` has seen room.
+        unsafe { *self.records.cast::<u16>().add(usize::from(*HALVES.as_ptr().add(place))) }
     }
 }
+
+/// For each place, and the one behind the last, which 16-bit number of the records holds its cost.
+static HALVES: [u16; MOST_PLACES + 1] = {
+    let mut halves = [0; MOST_PLACES + 1];
+    let mut place = 0;
+    while place < halves.len() {
+        // Of each four the middle ones are exchanged.
+        let half = place & 4 | (place & 1) << 1 | place >> 1 & 1;
+        halves[place] = (2 * RECORD * (place / BLOCK) + half) as u16;
+        place += 1;
+    }
+    halves
+};
