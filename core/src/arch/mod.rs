@@ -50,7 +50,7 @@ pub enum Backend {
     Sse41 = 2,
     /// x86-64 with AVX2: 32 bytes at a time.
     Avx2 = 3,
-    /// Cortex-M4 and M7, and ARMv7: four bytes of a register at a time.
+    /// Cortex-M4 and M7: four bytes of a register at a time.
     Dsp = 6,
 }
 
