@@ -3,39 +3,47 @@
 
 #![allow(missing_docs, unreachable_pub, reason = "the harness makes modules and functions of its own")]
 // The harness is there for this processor only.
-#![cfg_attr(not(target_arch = "x86_64"), no_main)]
-#![cfg(target_arch = "x86_64")]
-
+#[cfg(target_arch = "x86_64")]
 mod common;
 
+#[cfg(target_arch = "x86_64")]
 use std::hint::black_box;
 
+#[cfg(target_arch = "x86_64")]
 use common::Stages;
+#[cfg(target_arch = "x86_64")]
 use gungraun::{library_benchmark, library_benchmark_group, main};
 
 /// Each stage once. What was prepared is handed back: setting free what it holds is not counted.
-macro_rules! stage {
-    ($name:ident, $run:ident, $pictures:expr) => {
-        #[library_benchmark]
-        #[bench::once($pictures)]
-        fn $name(mut stages: Stages) -> Stages {
-            black_box(stages.$run());
-            stages
-        }
+#[cfg(target_arch = "x86_64")]
+macro_rules! stages {
+    ($($name:ident: $run:ident of $pictures:ident,)*) => {
+        $(
+            #[library_benchmark]
+            #[bench::once(Stages::$pictures())]
+            fn $name(mut stages: Stages) -> Stages {
+                black_box(stages.$run());
+                stages
+            }
+        )*
+        library_benchmark_group!(name = stages, benchmarks = [$($name),*]);
+        main!(library_benchmark_groups = stages);
     };
 }
 
-stage!(rectify, rectify, Stages::new());
-stage!(matching, match_rows, Stages::new());
-stage!(validate, validate, Stages::new());
-stage!(surfaces, surfaces, Stages::new());
-stage!(detect, detect, Stages::new());
-// Pictures that are made to cost much.
-stage!(matching_noise, match_rows, Stages::noise());
-stage!(detect_noise, detect, Stages::noise());
-stage!(matching_blocks, match_rows, Stages::blocks());
-stage!(detect_blocks, detect, Stages::blocks());
+#[cfg(target_arch = "x86_64")]
+stages! {
+    rectify: rectify of new,
+    matching: match_rows of new,
+    validate: validate of new,
+    surfaces: surfaces of new,
+    detect: detect of new,
+    // Pictures that are made to cost much.
+    matching_noise: match_rows of noise,
+    detect_noise: detect of noise,
+    matching_blocks: match_rows of blocks,
+    detect_blocks: detect of blocks,
+}
 
-library_benchmark_group!(name = stages, benchmarks = [rectify, matching, validate, surfaces, detect]);
-library_benchmark_group!(name = worst, benchmarks = [matching_noise, detect_noise, matching_blocks, detect_blocks]);
-main!(library_benchmark_groups = stages, worst);
+#[cfg(not(target_arch = "x86_64"))]
+fn main() {}

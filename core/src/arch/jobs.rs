@@ -196,7 +196,7 @@ impl Search {
     }
 
     /// Pixels that have all candidates, within `range`.
-    #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
+    #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"), dsp))]
     pub(crate) fn inner(&self) -> Range<usize> {
         let first = self.right_first + self.min_disparity + self.disparities - 1;
         let end = if self.right_first < self.right_end { self.right_end + self.min_disparity } else { 0 };

@@ -58,7 +58,7 @@ pub enum Backend {
     Avx512 = 4,
     /// AArch64: 16 bytes at a time, bits counted by an instruction.
     Neon = 5,
-    /// Cortex-M4 and M7, and ARMv7: four bytes of a register at a time.
+    /// Cortex-M4 and M7: four bytes of a register at a time.
     Dsp = 6,
 }
 
@@ -138,6 +138,23 @@ impl Chosen {
 
     pub(crate) const fn backend(self) -> Backend {
         self.0
+    }
+}
+
+/// Writes census codes of as many pixels as the backend does better than plain Rust, from the first on, and says how many. `rows` are
+/// those three above the pixel, two above, its own, two below and three below, from three columns before the first pixel on.
+///
+/// # Bound
+/// One step for each pixel.
+#[inline(always)]
+pub(crate) fn census_codes(chosen: Chosen, rows: [&[u8]; 5], out: &mut [u8]) -> usize {
+    match chosen.0 {
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::census_codes(rows, out),
+        _ => {
+            let _ = (rows, out);
+            0
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Census codes: which of eight pixels around a pixel are darker.
 
+use crate::arch::{self, Chosen};
+
 /// Pixels that the code looks at up, down, left and right.
 pub(super) const REACH: usize = 3;
 
@@ -15,17 +17,18 @@ pub(super) const ROWS: usize = 2 * REACH + 1;
 /// # Bound
 /// Eight comparisons for each pixel.
 #[inline(always)]
-pub(super) fn codes(rows: [&[u8]; ROWS], out: &mut [u8]) {
+pub(super) fn codes(chosen: Chosen, rows: [&[u8]; ROWS], out: &mut [u8]) {
     let width = rows.iter().fold(out.len(), |width, row| width.min(row.len()));
     out.fill(0);
     let Some(inner) = width.checked_sub(2 * REACH) else { return };
     let [top, upper, _, middle, _, lower, bottom] = rows;
+    let done = arch::census_codes(chosen, [top, upper, middle, lower, bottom], &mut out[REACH..REACH + inner]);
     // Slices of one length, one for each neighbour, so that the loop runs without checks.
     let neighbours = [(upper, 1), (upper, 5), (lower, 1), (lower, 5), (middle, 0), (middle, 6), (top, 3), (bottom, 3)];
-    let centre = &middle[REACH..REACH + inner];
-    let out = &mut out[REACH..REACH + inner];
+    let centre = &middle[REACH + done..REACH + inner];
+    let out = &mut out[REACH + done..REACH + inner];
     for (bit, (row, x)) in neighbours.into_iter().enumerate() {
-        for ((code, &centre), &neighbour) in out.iter_mut().zip(centre).zip(&row[x..x + inner]) {
+        for ((code, &centre), &neighbour) in out.iter_mut().zip(centre).zip(&row[x + done..x + inner]) {
             *code |= u8::from(neighbour < centre) << bit;
         }
     }

@@ -38,7 +38,7 @@ fn each_neighbour_on_the_ring_has_a_bit_of_its_own() {
 
 fn code_in_the_middle(rows: &[[u8; 7]; 7]) -> u8 {
     let mut out = [0xaa; 7];
-    codes(core::array::from_fn(|i| &rows[i][..]), &mut out);
+    codes(Chosen::PLAIN, core::array::from_fn(|i| &rows[i][..]), &mut out);
     for x in [0, 1, 2, 4, 5, 6] {
         assert_eq!(out[x], 0, "too near to an end");
     }
@@ -56,7 +56,7 @@ fn codes_along_a_row_are_those_of_each_pixel_by_itself() {
         })
     });
     let mut out = [0xff; 16];
-    codes(core::array::from_fn(|i| &rows[i][..]), &mut out);
+    codes(Chosen::PLAIN, core::array::from_fn(|i| &rows[i][..]), &mut out);
     // The bar is darker for the three neighbours above, the post for those three aside and two aside and below; for the post nothing
     // is.
     let count = out.map(u8::count_ones);
@@ -64,7 +64,7 @@ fn codes_along_a_row_are_those_of_each_pixel_by_itself() {
     // What a pixel says does not grow with contrast, nor change with brightness.
     let mut faint = [0; 16];
     let faint_rows = rows.map(|row| row.map(|grey| 50 + grey / 20));
-    codes(core::array::from_fn(|i| &faint_rows[i][..]), &mut faint);
+    codes(Chosen::PLAIN, core::array::from_fn(|i| &faint_rows[i][..]), &mut faint);
     assert_eq!(faint, out);
 }
 
@@ -73,7 +73,7 @@ fn rows_too_short_for_the_ring_have_no_codes() {
     for width in 0..7 {
         let row = [0u8, 255, 0, 255, 0, 255, 0];
         let mut out = [1; 7];
-        codes([&row[..width]; ROWS], &mut out);
+        codes(Chosen::PLAIN, [&row[..width]; ROWS], &mut out);
         assert_eq!(out, [0; 7], "{width}");
     }
 }

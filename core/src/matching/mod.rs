@@ -142,7 +142,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             pictures: [left, right],
             spans: [left_span, right_span],
             settings: &self.settings,
-            split_codes: self.plan.chosen.backend().splits_codes(),
+            chosen: self.plan.chosen,
         };
         arch::compiled(self.plan.chosen, steps);
         self.absorb();

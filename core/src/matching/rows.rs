@@ -1,7 +1,7 @@
 //! The rows under the window, as they come in.
 
 use super::{MatchCost, MatchSettings, Prefilter, census, prefilter};
-use crate::arch::{self, CodeRow};
+use crate::arch::{self, Chosen, CodeRow};
 
 /// Filtered rows that are kept: the window, and the one that leaves it.
 pub(super) const KEPT: usize = MatchSettings::MAX_WINDOW as usize + 1;
@@ -135,8 +135,9 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         left_span: ValidSpan,
         right_span: ValidSpan,
         settings: &MatchSettings,
-        split_codes: bool,
+        chosen: Chosen,
     ) {
+        let split_codes = chosen.backend().splits_codes();
         let slot = self.pushed % GREY;
         let width = left.len();
         self.grey_left[slot][..width].copy_from_slice(left);
@@ -154,7 +155,7 @@ impl<const WIDTH: usize> Rows<WIDTH> {
             let [_, _, above, middle, below, _, _] = rows;
             prefilter::filter(settings.prefilter, above, middle, below, &mut filtered[..width]);
             if settings.cost == MatchCost::Census {
-                census::codes(rows, &mut codes[..width]);
+                census::codes(chosen, rows, &mut codes[..width]);
             }
         }
         let grey = &grey_left[y % GREY][..width];

@@ -4,7 +4,7 @@ use super::{
     MatchSettings, best::RightBest, columns::Columns, plan::Plan, rows::Evidence, rows::Rows, rows::ValidSpan,
 };
 use crate::{
-    arch::{self, Decide, Found, Search, Steps, Sums},
+    arch::{self, Chosen, Decide, Found, Search, Steps, Sums},
     disparity::DisparityPixel,
 };
 
@@ -14,14 +14,14 @@ pub(super) struct PushRow<'a, const WIDTH: usize> {
     pub(super) pictures: [&'a [u8]; 2],
     pub(super) spans: [ValidSpan; 2],
     pub(super) settings: &'a MatchSettings,
-    pub(super) split_codes: bool,
+    pub(super) chosen: Chosen,
 }
 
 impl<const WIDTH: usize> Steps for PushRow<'_, WIDTH> {
     #[inline(always)]
     fn run(self) {
         let ([left, right], [left_span, right_span]) = (self.pictures, self.spans);
-        self.rows.push(left, right, left_span, right_span, self.settings, self.split_codes);
+        self.rows.push(left, right, left_span, right_span, self.settings, self.chosen);
     }
 }
 

@@ -52,20 +52,21 @@ pub(in crate::arch) fn search_keys(job: KeyJob<'_>) {
         return;
     };
     let tables = right.tables.map(|table| table.as_mut_ptr());
+    let inner = search.inner();
     for (i, x) in search.range.clone().enumerate() {
         // SAFETY: `Costs::new` has seen that the columns under the window and the costs lie in their slices, and the tables were seen
         // to hold the places of a column from every pixel of the range on.
         unsafe {
             let pixel = Pixel::new(search, columns, x, tables[x % 2].add(x));
-            let candidates = search.candidates(x);
+            let candidates = if inner.contains(&x) { 0..search.disparities } else { search.candidates(x) };
             let Some(least) = costs.go_on::<true>(&pixel, &candidates) else { continue };
             let number = |cost: u16| (cost << 7 ^ 0x8000) as i16;
             let above = limits.above((least ^ 0x8000) as i16, found.weak(i));
             let bound = above as u16 ^ 0x8000;
             let near = costs.near(&candidates, bound, bound >> 7);
             let place = usize::from((least & 0x7f) - costs.first_place);
-            let beside = [place.saturating_sub(1), place, place + 1].map(|place| number(costs.at(place)));
-            found.put(i, place, beside, near, above);
+            let [nearer, farther] = [place.saturating_sub(1), place + 1].map(|place| number(costs.at(place)));
+            found.put(i, place, [nearer, number(least >> 7), farther], near, above);
         }
     }
 }
@@ -78,19 +79,20 @@ pub(super) fn search_costs(job: CostJob<'_, u8>) {
         debug_assert!(false, "the plan of the matcher sees to it that everything fits");
         return;
     };
+    let inner = search.inner();
     for (i, x) in search.range.clone().enumerate() {
         // SAFETY: `Costs::new` has seen that the columns under the window and the costs lie in their slices; there is no table.
         unsafe {
             let pixel = Pixel::new(search, columns, x, core::ptr::null_mut());
-            let candidates = search.candidates(x);
+            let candidates = if inner.contains(&x) { 0..search.disparities } else { search.candidates(x) };
             let Some(least) = costs.go_on::<false>(&pixel, &candidates) else { continue };
             let number = |cost: u16| (cost ^ 0x8000) as i16;
             let above = search.above(number(least), found.weak(i));
             let bound = above as u16 ^ 0x8000;
             let near = costs.near(&candidates, bound, bound);
             let place = costs.first_of(candidates, least);
-            let beside = [place.saturating_sub(1), place, place + 1].map(|place| number(costs.at(place)));
-            found.put(i, place, beside, near, above);
+            let [nearer, farther] = [place.saturating_sub(1), place + 1].map(|place| number(costs.at(place)));
+            found.put(i, place, [nearer, number(least), farther], near, above);
         }
     }
 }
@@ -123,7 +125,7 @@ impl Costs {
         let blocks = stride / BLOCK;
         // Pairs of words are read at once, which wants them aligned.
         let first = PAD + work.as_ptr().align_offset(4);
-        let records = work.get_mut(first..first + 2 * RECORD * blocks)?.as_mut_ptr().cast::<u32>();
+        let records = work.get_mut(first..first + 2 * RECORD * blocks + 1)?.as_mut_ptr().cast::<u32>();
         let costs = Self { records, blocks, first_place: (MOST_PLACES - stride) as u16 };
         if !search.follows {
             // SAFETY: columns up to the first one's window and the costs were just seen to lie in the slices.
@@ -185,12 +187,70 @@ impl Costs {
             if candidates.is_empty() {
                 return None;
             }
-            let mut all = u32::MAX;
-            for block in 0..self.blocks {
-                all = least(all, *self.record(block).add(4));
-            }
+            let all = self.least();
             Some((all as u16).min((all >> 16) as u16))
         }
+    }
+
+    /// The least numbers of all blocks.
+    ///
+    /// # Safety
+    /// That of [`Self::go_on`].
+    #[inline(always)]
+    unsafe fn least(&self) -> u32 {
+        let all;
+        // SAFETY: reads the last word of each record, of which there is one at least; `build.rs` guarantees that the processor has the
+        // instructions.
+        unsafe {
+            asm!(
+                "ldr {all}, [{record}], #20",
+                "b 3f",
+                "2:",
+                "ldr {minimum}, [{record}], #20",
+                "usub16 {difference}, {all}, {minimum}",
+                "sel {all}, {minimum}, {all}",
+                "3:",
+                "subs {blocks}, {blocks}, #1",
+                "bne 2b",
+                all = out(reg) all,
+                record = inout(reg) self.records.add(RECORD - 1) => _,
+                blocks = inout(reg) self.blocks => _,
+                minimum = out(reg) _,
+                difference = out(reg) _,
+                options(nostack, readonly),
+            );
+        }
+        all
+    }
+
+    /// The next block, from the given one on, whose least number is below `numbers`; one behind the last if there is none.
+    ///
+    /// # Safety
+    /// That of [`Self::go_on`], and there is a block left.
+    #[inline(always)]
+    unsafe fn next_below(&self, from: usize, numbers: u32) -> usize {
+        let left: usize;
+        // SAFETY: as in `least`, of the blocks from the given one on.
+        unsafe {
+            asm!(
+                "2:",
+                "ldr {minimum}, [{record}], #20",
+                "usub16 r0, {minimum}, {numbers}",
+                "sel r0, {zero}, {numbers}",
+                "cbnz r0, 3f",
+                "subs {left}, {left}, #1",
+                "bne 2b",
+                "3:",
+                record = inout(reg) self.record(from).add(RECORD - 1) => _,
+                left = inout(reg) self.blocks - from => left,
+                numbers = in(reg) numbers,
+                zero = in(reg) 0,
+                minimum = out(reg) _,
+                out("r0") _,
+                options(nostack, readonly),
+            );
+        }
+        self.blocks - left
     }
 
     /// A block of which not all places are candidates.
@@ -363,16 +423,17 @@ impl Costs {
     #[inline(always)]
     unsafe fn near(&self, candidates: &Range<usize>, number: u16, cost: u16) -> u16 {
         let (numbers, costs) = (both(number), both(cost));
-        let mut near = 0;
-        for block in 0..self.blocks {
-            let first = BLOCK * block;
+        let (mut near, mut block) = (0, 0);
+        while block < self.blocks {
             // SAFETY: that of this function.
             unsafe {
-                let record = self.record(block);
-                if below(*record.add(4), numbers) == 0 {
-                    continue;
+                block = self.next_below(block, numbers);
+                if block == self.blocks {
+                    break;
                 }
+                let first = BLOCK * block;
                 if first >= candidates.start && first + BLOCK <= candidates.end {
+                    let record = self.record(block);
                     near += below(*record, costs) + below(*record.add(1), costs);
                     near += below(*record.add(2), costs) + below(*record.add(3), costs);
                 } else {
@@ -383,6 +444,7 @@ impl Costs {
             if (near & 0xffff) + (near >> 16) >= AMBIGUOUS {
                 break;
             }
+            block += 1;
         }
         ((near & 0xffff) + (near >> 16)) as u16
     }
@@ -405,16 +467,26 @@ impl Costs {
         }
     }
 
-    /// The cost of a place; of the last one for those beyond.
+    /// The cost of a place; any number for the one behind the last.
     ///
     /// # Safety
-    /// That of [`Self::go_on`].
+    /// That of [`Self::go_on`], and that the place is not beyond that.
     #[inline(always)]
     unsafe fn at(&self, place: usize) -> u16 {
-        let place = place.min(BLOCK * self.blocks - 1);
-        // Of each four the middle ones are exchanged.
-        let half = place & 4 | (place & 1) << 1 | place >> 1 & 1;
-        // SAFETY: that of this function.
-        unsafe { *self.record(place / BLOCK).cast::<u16>().add(half) }
+        // SAFETY: the table has a number for each place and the one behind the last, for which `new` has seen room.
+        unsafe { *self.records.cast::<u16>().add(usize::from(*HALVES.as_ptr().add(place))) }
     }
 }
+
+/// For each place, and the one behind the last, which 16-bit number of the records holds its cost.
+static HALVES: [u16; MOST_PLACES + 1] = {
+    let mut halves = [0; MOST_PLACES + 1];
+    let mut place = 0;
+    while place < halves.len() {
+        // Of each four the middle ones are exchanged.
+        let half = place & 4 | (place & 1) << 1 | place >> 1 & 1;
+        halves[place] = (2 * RECORD * (place / BLOCK) + half) as u16;
+        place += 1;
+    }
+    halves
+};
