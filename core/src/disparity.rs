@@ -149,10 +149,40 @@ impl<'a> DisparityPicture<'a> {
         self.pixels.get(start..start.saturating_add(self.width)).unwrap_or_default()
     }
 
+    /// Pixels with a disparity, and those without, by [`Reason`].
+    ///
+    /// # Bound
+    /// Eight comparisons for each pixel, many side by side.
+    pub(crate) fn counts(&self) -> (u32, [u32; Reason::ALL.len()]) {
+        let mut with = 0u32;
+        let mut without = [0u32; Reason::ALL.len()];
+        // In short pieces counts fit 16 bits, as wide as the pixels.
+        for piece in self.pixels.chunks(4096) {
+            let has_value = count(piece, |pixel| pixel.has_value());
+            with += has_value;
+            let mut known = has_value;
+            for (without, reason) in without.iter_mut().zip(Reason::ALL).skip(1) {
+                let said = count(piece, |pixel| pixel == DisparityPixel::none(reason));
+                *without += said;
+                known += said;
+            }
+            let zero = count(piece, |pixel| pixel.bits() == 0);
+            without[Reason::OutOfRange as usize] += zero;
+            without[Reason::OutsideValidArea as usize] += (piece.len() as u32).saturating_sub(known + zero);
+        }
+        (with, without)
+    }
+
     /// All pixels, row by row.
     pub const fn pixels(&self) -> &'a [DisparityPixel] {
         self.pixels
     }
+}
+
+/// How many of up to 2^16 - 1 pixels are as asked.
+#[inline(always)]
+fn count(pixels: &[DisparityPixel], is_so: impl Fn(DisparityPixel) -> bool) -> u32 {
+    u32::from(pixels.iter().fold(0u16, |count, &pixel| count.wrapping_add(u16::from(is_so(pixel)))))
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! All 65,536 pixels, and pictures of every shape.
 
+use std::vec::Vec;
+
 use super::*;
+use crate::test_random::Random;
 
 #[test]
 fn any_bits_are_a_disparity_or_a_reason() {
@@ -44,5 +47,27 @@ fn pictures_have_whole_rows_only() {
             }
             assert!(picture.row(height).is_empty() && picture.row(usize::MAX).is_empty());
         }
+    }
+}
+
+#[test]
+fn counts_are_those_of_looking_at_each_pixel() {
+    let mut random = Random::seeded("counts of pixels", 0x5eed_0208);
+    for len in [0, 1, 31, 4095, 4096, 4097, 10_000] {
+        let any = |random: &mut Random| match random.below(4) {
+            0 => random.below(0x1_0000) as u16,
+            1 => 0x8000 + random.below(9) as u16,
+            2 => random.below(2) as u16 * 0x7fff,
+            _ => random.below(0x8000) as u16,
+        };
+        let pixels: Vec<_> = (0..len).map(|_| DisparityPixel::from_bits(any(&mut random))).collect();
+        let (mut with, mut without) = (0, [0; 7]);
+        for pixel in &pixels {
+            match pixel.get() {
+                Ok(_) => with += 1,
+                Err(reason) => without[reason as usize] += 1,
+            }
+        }
+        assert_eq!(DisparityPicture::new(&pixels, 1).counts(), (with, without));
     }
 }

@@ -24,6 +24,7 @@ pub mod error;
 pub mod geometry;
 pub mod ground;
 pub mod health;
+mod lanes;
 mod links;
 pub mod map;
 pub mod matching;

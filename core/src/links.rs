@@ -28,10 +28,10 @@ pub(crate) struct Links {
 
 impl Links {
     /// The links of `piece`; `before` is the pixel to the left of it, 0 if there is none.
+    #[inline(always)]
     pub(crate) fn of(piece: &Piece, before: u16, values: &Range<u16>, step: u16) -> Self {
         let value = within(piece, values);
-        let mut shifted = [before; PIECE];
-        shifted[1..].copy_from_slice(&piece[..PIECE - 1]);
+        let shifted = shifted(piece, before);
         let value_before = value << 1 | u32::from(values.contains(&before));
         Self { value, left: value & value_before & near(piece, &shifted, step) }
     }
@@ -43,6 +43,7 @@ impl Links {
 }
 
 /// The piece of `row` from pixel `x` on.
+#[inline(always)]
 pub(crate) fn piece(row: &[DisparityPixel], x: usize) -> Piece {
     let mut piece = [0; PIECE];
     let pixels = row.get(x..).unwrap_or_default();
@@ -60,33 +61,71 @@ pub(crate) fn piece(row: &[DisparityPixel], x: usize) -> Piece {
 }
 
 /// Where `piece` lies within `values`.
+#[inline(always)]
 fn within(piece: &Piece, values: &Range<u16>) -> u32 {
     let span = values.end.saturating_sub(values.start);
-    bits(core::array::from_fn(|i| u8::from(piece[i].wrapping_sub(values.start) < span)))
+    let mut flags = [0; PIECE];
+    for (flag, value) in flags.iter_mut().zip(piece) {
+        *flag = u8::from(value.wrapping_sub(values.start) < span);
+    }
+    bits(&flags)
 }
 
 /// Where two pieces differ by no more than `step`.
+#[inline(always)]
 pub(crate) fn near(a: &Piece, b: &Piece, step: u16) -> u32 {
-    bits(core::array::from_fn(|i| u8::from(a[i].abs_diff(b[i]) <= step)))
+    let mut flags = [0; PIECE];
+    for (flag, (a, b)) in flags.iter_mut().zip(a.iter().zip(b)) {
+        *flag = u8::from(a.abs_diff(*b) <= step);
+    }
+    bits(&flags)
 }
 
-/// Where two rows of bytes are the same.
-pub(crate) fn same(a: &[u8; PIECE], b: &[u8; PIECE]) -> u32 {
-    bits(core::array::from_fn(|i| u8::from(a[i] == b[i])))
+/// Where two rows are the same.
+#[inline(always)]
+pub(crate) fn same<T: PartialEq>(a: &[T; PIECE], b: &[T; PIECE]) -> u32 {
+    let mut flags = [0; PIECE];
+    for (flag, (a, b)) in flags.iter_mut().zip(a.iter().zip(b)) {
+        *flag = u8::from(a == b);
+    }
+    bits(&flags)
+}
+
+/// Where a row differs from what lies to the left; the first place from zero.
+#[inline(always)]
+pub(crate) fn changes<T: PartialEq + Copy + Default>(row: &[T; PIECE]) -> u32 {
+    !same(row, &shifted(row, T::default()))
+}
+
+/// A row one place to the right, with `before` as the first.
+#[inline(always)]
+pub(crate) fn shifted<T: Copy>(row: &[T; PIECE], before: T) -> [T; PIECE] {
+    // Copied as a whole, which is a few registers: a part of it would be a call.
+    let mut twice = [[before; PIECE]; 2];
+    let [_, whole] = &mut twice;
+    *whole = *row;
+    let mut shifted = [before; PIECE];
+    if let Some(from) = twice.as_flattened().get(PIECE - 1..).and_then(|rest| rest.first_chunk()) {
+        shifted = *from;
+    }
+    shifted
 }
 
 /// Bytes that are 0 or 1 as bits, the first in the lowest one.
-fn bits(flags: [u8; PIECE]) -> u32 {
+#[inline(always)]
+fn bits(flags: &[u8; PIECE]) -> u32 {
     // The product brings the lowest bits of eight bytes side by side into its highest byte.
     const GATHER: u64 = 0x0102_0408_1020_4080;
     let (eights, _) = flags.as_chunks::<8>();
-    eights
-        .iter()
-        .rev()
-        .fold(0, |bits, eight| bits << 8 | (u64::from_le_bytes(*eight).wrapping_mul(GATHER) >> 56) as u32)
+    let mut bits = 0;
+    for eight in eights.iter().rev() {
+        bits = bits << 8 | (u64::from_le_bytes(*eight).wrapping_mul(GATHER) >> 56) as u32;
+    }
+    bits
 }
 
 /// The bits of `of`, lowest first, each alone.
+#[inline(always)]
 pub(crate) fn each_bit(mut of: u32) -> impl Iterator<Item = u32> {
     core::iter::from_fn(move || {
         let bit = of & of.wrapping_neg();

@@ -173,8 +173,8 @@ pub struct BenchArgs {
     /// Pairs that are worked on side by side, each by a thread with a detector of its own.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=MAX_PAIRS as i64))]
     pub threads: u8,
-    /// Whose instructions the matching is made of: plain, sse2, sse4.1 or avx2; the fastest that the processor has if left out.
-    /// No result depends on it.
+    /// Whose instructions the matching is made of: plain, sse2, sse4.1, avx2, avx512 or neon; the fastest that the processor has
+    /// if left out. No result depends on it.
     #[arg(long, value_name = "NAME", value_parser = backend)]
     pub backend: Option<Backend>,
     /// The figures as JSON.

@@ -3,6 +3,7 @@
 use std::{fs::File, io::BufReader};
 
 use fencepost_core::{
+    arch::Backend,
     detector::{Capacities, Detector},
     disparity::{DisparityPicture, DisparityPixel},
     geometry::{
@@ -19,12 +20,12 @@ use fencepost_core::{
 
 pub(crate) const WIDTH: usize = 320;
 pub(crate) const HEIGHT: usize = 240;
-const DISPARITIES: usize = 48;
+pub(crate) const DISPARITIES: usize = 48;
 const CAPACITIES: Capacities = Capacities::for_pictures(WIDTH, HEIGHT, DISPARITIES);
 const GRID: usize = CAPACITIES.grid;
 const SURFACES: usize = CAPACITIES.surfaces;
 
-const PAIR: RectifiedPair = RectifiedPair {
+pub(crate) const PAIR: RectifiedPair = RectifiedPair {
     width: WIDTH as u32,
     height: HEIGHT as u32,
     focal_px: 262.5,
@@ -34,10 +35,10 @@ const PAIR: RectifiedPair = RectifiedPair {
     disparity_offset_px: 0.0,
 };
 
-const MOUNT: Mount =
+pub(crate) const MOUNT: Mount =
     Mount { height_m: Some(1.1), pitch_down_deg: 10.0, roll_deg: 0.0, forward_m: 0.0, left_m: 0.0, yaw_left_deg: 0.0 };
 
-type Whole =
+pub(crate) type Whole =
     Detector<{ WIDTH * HEIGHT }, WIDTH, DISPARITIES, GRID, SURFACES, { CAPACITIES.obstacles }, { CAPACITIES.cells }>;
 
 /// Every stage, with what the one before it has made.
@@ -57,11 +58,16 @@ pub(crate) struct Stages {
 impl Stages {
     /// Ready to run, and warm.
     pub(crate) fn new() -> Self {
+        Self::with(Backend::fastest())
+    }
+
+    /// The same with a backend that the processor has.
+    pub(crate) fn with(backend: Backend) -> Self {
         let matching = MatchSettings { disparities: DISPARITIES as u16, ..MatchSettings::DEFAULT };
         let settings = Settings { matching, ..Settings::default() };
         let frame = VehicleFrame::new(&MOUNT).unwrap();
         let mut stages = Self {
-            pictures: ["image_0", "image_1"].map(picture),
+            pictures: ["image_0", "image_1"].map(|folder| picture(folder, 0)),
             detector: Box::default(),
             rectifier: Box::default(),
             matcher: Box::default(),
@@ -72,8 +78,9 @@ impl Stages {
             depth: Box::default(),
             rays: Rays::new(&PAIR, &frame),
         };
+        assert!(stages.detector.set_backend(backend) && stages.matcher.set_backend(backend));
         stages.detector.configure(&settings, &StereoCalibration::Rectified(PAIR), &MOUNT).unwrap();
-        stages.rectifier.configure(&StereoCalibration::Raw(raw())).unwrap();
+        stages.rectifier.configure(&StereoCalibration::Raw(raw(PAIR))).unwrap();
         stages.matcher.configure(&settings.matching, WIDTH, HEIGHT).unwrap();
         stages.surface_size.configure(&settings.validate, WIDTH).unwrap();
         stages.surfaces.configure(&settings.surfaces, WIDTH, HEIGHT).unwrap();
@@ -136,9 +143,9 @@ impl Stages {
     }
 }
 
-/// The first left or right picture of the recording that is committed beside the tests of the whole system.
-fn picture(folder: &str) -> Vec<u8> {
-    let path = format!("{}/../tests/recordings/trail/{folder}/000000.png", env!("CARGO_MANIFEST_DIR"));
+/// A left or right picture of the recording that is committed beside the tests of the whole system.
+pub(crate) fn picture(folder: &str, number: usize) -> Vec<u8> {
+    let path = format!("{}/../tests/recordings/trail/{folder}/{number:06}.png", env!("CARGO_MANIFEST_DIR"));
     let file = BufReader::new(File::open(path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
     let mut pixels = vec![0; WIDTH * HEIGHT];
@@ -146,23 +153,23 @@ fn picture(folder: &str) -> Vec<u8> {
     pixels
 }
 
-/// The pair behind lenses.
-fn raw() -> RawPair {
+/// A pair behind lenses.
+pub(crate) fn raw(pair: RectifiedPair) -> RawPair {
     const IDENTITY: [[f32; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let camera = CameraModel {
-        width: PAIR.width,
-        height: PAIR.height,
-        fx: PAIR.focal_px,
-        fy: PAIR.focal_px,
-        cx: PAIR.cx,
-        cy: PAIR.cy,
+        width: pair.width,
+        height: pair.height,
+        fx: pair.focal_px,
+        fy: pair.focal_px,
+        cx: pair.cx,
+        cy: pair.cy,
         distortion: Distortion([-0.2, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     };
     RawPair {
         left: camera,
         right: camera,
         rotation: IDENTITY,
-        translation_m: [-PAIR.baseline_m, 0.0, 0.0],
-        rectification: Some(Rectification { left_rotation: IDENTITY, right_rotation: IDENTITY, pair: PAIR }),
+        translation_m: [-pair.baseline_m, 0.0, 0.0],
+        rectification: Some(Rectification { left_rotation: IDENTITY, right_rotation: IDENTITY, pair }),
     }
 }

@@ -40,6 +40,22 @@ impl Sums {
             *out = sum;
         }
     }
+
+    /// 1 for each pixel whose texture is below the limit, 0 for the others.
+    ///
+    /// # Bound
+    /// A step for each pixel.
+    #[inline(always)]
+    pub(crate) fn weak(&self, weak_texture: u32, weak: &mut [u8; CHUNK]) {
+        for (weak, &sum) in weak.iter_mut().zip(&self.0) {
+            *weak = u8::from(texture(sum) < weak_texture);
+        }
+    }
+}
+
+#[inline(always)]
+const fn texture(sum: u32) -> u32 {
+    sum & ((1 << TEXTURE_BITS) - 1)
 }
 
 /// The limits that decide.
@@ -51,8 +67,8 @@ pub(crate) struct Decide {
     pub(crate) weak_texture: u32,
     /// Only the pixels that are weak are decided on, and stay weak.
     pub(crate) only_weak: bool,
-    /// Whether ambiguous places are refused.
-    pub(crate) unique: bool,
+    /// Whether ambiguous places are refused: where there is texture, and where it is weak.
+    pub(crate) unique: [bool; 2],
     /// Whether keys were found, or costs.
     pub(crate) keys: bool,
 }
@@ -91,7 +107,9 @@ impl Decide {
             let above = found.above[i];
             // The two places beside the best one do not count.
             let beside = 1 + u16::from(found.nearer[i] < above) + u16::from(found.farther[i] < above);
-            let ambiguous = self.unique & (found.near[i] > beside);
+            let weak_here = found.weak[i] != 0;
+            let unique = if weak_here { self.unique[1] } else { self.unique[0] };
+            let ambiguous = unique & (found.near[i] > beside);
             let disparity = top - i32::from(found.place[i]);
             let offset = refine(cost(found.farther[i]), cost(found.best[i]), cost(found.nearer[i]));
             let steps = (16 * disparity + offset).max(0);
@@ -101,11 +119,11 @@ impl Decide {
             // At an end of the range the true minimum may lie beyond, and there is no neighbour to interpolate with.
             let at_end = (disparity >= largest) | (disparity <= smallest);
             let bits = if at_end { none(Reason::OutOfRange) } else { bits };
-            let (texture, saturated) = (sums.0[i] & ((1 << TEXTURE_BITS) - 1), sums.0[i] >> TEXTURE_BITS);
+            let (texture, saturated) = (texture(sums.0[i]), sums.0[i] >> TEXTURE_BITS);
             let bits = if texture < self.min_texture { none(Reason::LowTexture) } else { bits };
             let bits = if saturated > self.max_saturated { none(Reason::Saturated) } else { bits };
             let told_apart = (bits != none(Reason::LowTexture)) & (bits != none(Reason::NotUnique));
-            untold[i] = u8::from(!told_apart & (texture < self.weak_texture));
+            untold[i] = u8::from(!told_apart & weak_here);
             decided[i] = if largest < smallest { 0 } else { bits as u16 };
         }
         if search.right_first >= search.right_end {

@@ -15,7 +15,10 @@ pub(crate) struct CodeRow<'a> {
     /// Right codes, or their lower four bits where the backend splits them; pixel `x` at `lead + x`.
     pub(crate) low: &'a [u8],
     /// Upper four bits, where the backend splits codes; pixel `x` at `lead + x`.
-    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "no backend here splits codes"))]
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))),
+        expect(dead_code, reason = "plain Rust does not split codes")
+    )]
     pub(crate) high: &'a [u8],
     /// Bytes in front of the first pixel that may be read and mean nothing.
     pub(crate) lead: usize,
@@ -47,9 +50,13 @@ pub(crate) struct Search {
     /// Right pixels on which a window may stand.
     pub(crate) right_first: usize,
     pub(crate) right_end: usize,
-    pub(crate) uniqueness_percent: u16,
+    /// How much better than any other a place must be: where there is texture, and where it is weak.
+    pub(crate) uniqueness_percent: [u16; 2],
     /// Whether no cost is above 2040 and no sum of a column above 127.
-    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "plain Rust has one way for all costs"))]
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"), dsp)),
+        expect(dead_code, reason = "plain Rust has one way for all costs")
+    )]
     pub(crate) is_small: bool,
 }
 
@@ -62,11 +69,38 @@ pub(crate) struct Right<'a> {
     pub(crate) lead: usize,
 }
 
+/// A search by keys of cost and place: for costs below 512 and places below 128.
+pub(crate) struct KeyJob<'a> {
+    pub(crate) search: &'a Search,
+    pub(crate) limits: &'a KeyLimits,
+    /// Sums over the rows of the window.
+    pub(crate) columns: &'a [u8],
+    /// Keys of the pixel at hand, from [`PAD`] on; those of the last one are still needed where the next job follows it.
+    pub(crate) work: &'a mut [i16],
+    pub(crate) right: Right<'a>,
+    pub(crate) found: &'a mut Found,
+}
+
+/// A search by costs, for sums whose window sums fit 16 bits.
+pub(crate) struct CostJob<'a, Sum> {
+    pub(crate) search: &'a Search,
+    /// Sums over the rows of the window.
+    pub(crate) columns: &'a [Sum],
+    /// Costs of the pixel at hand less 32768, from [`PAD`] on; as with keys.
+    pub(crate) work: &'a mut [i16],
+    /// `None` where the right pixels are not asked.
+    pub(crate) right: Option<Right<'a>>,
+    pub(crate) found: &'a mut Found,
+}
+
 /// The best place of each pixel that was searched for, and what is beside it. Nothing is said of pixels without candidates.
+/// Which of them have weak texture is told before the search.
 ///
 /// Numbers are as the search has them: keys, or costs less 32768. What they mean is worked out for many pixels at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Found {
+    /// 1 where the texture is weak, 0 elsewhere.
+    pub(crate) weak: [u8; CHUNK],
     /// The least one.
     pub(crate) best: [i16; CHUNK],
     /// Its place, the first one of several.
@@ -83,7 +117,21 @@ pub(crate) struct Found {
 impl Found {
     pub(crate) const fn new() -> Self {
         let (numbers, counts) = ([0; CHUNK], [0; CHUNK]);
-        Self { best: numbers, place: counts, farther: numbers, nearer: numbers, above: numbers, near: counts }
+        Self {
+            weak: [0; CHUNK],
+            best: numbers,
+            place: counts,
+            farther: numbers,
+            nearer: numbers,
+            above: numbers,
+            near: counts,
+        }
+    }
+
+    /// 1 if the texture is weak at pixel `i` of the chunk.
+    #[inline(always)]
+    pub(crate) fn weak(&self, i: usize) -> usize {
+        usize::from(self.weak[i % CHUNK] & 1)
     }
 
     /// Writes down what was found of pixel `i` of the chunk.
@@ -99,28 +147,31 @@ impl Found {
     }
 }
 
-/// For each cost below 512 the least key that is not nearly as good.
+/// For each cost below 512 the least key that is not nearly as good: where there is texture, and where it is weak.
 #[derive(Clone, Debug)]
-pub(crate) struct KeyLimits([i16; KEY_COSTS]);
+pub(crate) struct KeyLimits([[i16; KEY_COSTS]; 2]);
 
 /// Costs that a key has room for. The largest one is that of no candidate.
 pub(crate) const KEY_COSTS: usize = 512;
 
 impl KeyLimits {
     pub(crate) const fn new() -> Self {
-        Self([0; KEY_COSTS])
+        Self([[0; KEY_COSTS]; 2])
     }
 
-    pub(crate) fn fill(&mut self, uniqueness_percent: u16) {
-        for (cost, above) in (0..).zip(&mut self.0) {
-            // Costs reach 510 at most.
-            *above = (((limit(cost, uniqueness_percent).min(510) + 1) << 7) as u16 as i16).wrapping_add(i16::MIN);
+    pub(crate) fn fill(&mut self, uniqueness_percent: [u16; 2]) {
+        for (limits, percent) in self.0.iter_mut().zip(uniqueness_percent) {
+            for (cost, above) in (0..).zip(limits) {
+                // Costs reach 510 at most.
+                *above = (((limit(cost, percent).min(510) + 1) << 7) as u16 as i16).wrapping_add(i16::MIN);
+            }
         }
     }
 
+    /// The least key that is not nearly as good as `key`; `weak` is that of [`Found::weak`].
     #[inline(always)]
-    pub(crate) fn above(&self, key: i16) -> i16 {
-        self.0[usize::from(key.wrapping_sub(i16::MIN) as u16 >> 7)]
+    pub(crate) fn above(&self, key: i16, weak: usize) -> i16 {
+        self.0[weak & 1][usize::from(key.wrapping_sub(i16::MIN) as u16 >> 7)]
     }
 }
 
@@ -145,7 +196,7 @@ impl Search {
     }
 
     /// Pixels that have all candidates, within `range`.
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
     pub(crate) fn inner(&self) -> Range<usize> {
         let first = self.right_first + self.min_disparity + self.disparities - 1;
         let end = if self.right_first < self.right_end { self.right_end + self.min_disparity } else { 0 };
@@ -153,10 +204,11 @@ impl Search {
         first..end.clamp(first, self.range.end)
     }
 
-    /// The least number, a cost less 32768, that is not nearly as good as `best`.
+    /// The least number, a cost less 32768, that is not nearly as good as `best`; `weak` is that of [`Found::weak`].
     #[inline(always)]
-    pub(crate) fn above(&self, best: i16) -> i16 {
-        let limit = limit(best.wrapping_sub(i16::MIN) as u16, self.uniqueness_percent).min(u32::from(u16::MAX) - 1);
+    pub(crate) fn above(&self, best: i16, weak: usize) -> i16 {
+        let percent = self.uniqueness_percent[weak & 1];
+        let limit = limit(best.wrapping_sub(i16::MIN) as u16, percent).min(u32::from(u16::MAX) - 1);
         (limit as u16 as i16).wrapping_sub(i16::MAX)
     }
 }

@@ -21,19 +21,25 @@
 //! vectors, and 25 instead of 7 to count bits without look-up. To decide takes some 60 instructions for eight pixels. The
 //! wide window is asked for weak pixels only, and made afresh at each run of them.
 
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+#[expect(unsafe_code, reason = "vectors are loaded and stored through pointers")]
+mod aarch64;
 mod decide;
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
 #[expect(clippy::needless_range_loop, reason = "loops of a fixed number of rounds, by number, are what is unrolled")]
 #[expect(unsafe_code, reason = "vectors are loaded and stored through pointers, within bounds that are checked before")]
 mod generic;
 mod jobs;
 mod plain;
+#[cfg(dsp)]
+#[expect(unsafe_code, reason = "instructions that have no functions of their own, and sums read four at a time")]
+mod thumb;
 #[cfg(target_arch = "x86_64")]
 #[expect(unsafe_code, reason = "instructions that not every processor has, used where it has them")]
 mod x86_64;
 
 pub(crate) use decide::{Decide, NO_PARTNER, Sums, back_check, evidence, refine};
-pub(crate) use jobs::{CHUNK, CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
+pub(crate) use jobs::{CHUNK, CodeRow, CostJob, Found, KeyJob, KeyLimits, PAD, Right, Search, SlideCodes};
 
 /// Whose instructions the inner loops are made of. All of them give the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,11 +53,17 @@ pub enum Backend {
     Sse41 = 2,
     /// x86-64 with AVX2: 32 bytes at a time.
     Avx2 = 3,
+    /// x86-64 with AVX-512 (F, BW, VL and BITALG: since Ice Lake and Zen 4): 64 bytes at a time, bits counted by an instruction.
+    Avx512 = 4,
+    /// AArch64: 16 bytes at a time, bits counted by an instruction.
+    Neon = 5,
+    /// Cortex-M4 and M7, and ARMv7: four bytes of a register at a time.
+    Dsp = 6,
 }
 
 impl Backend {
-    /// Every backend, slowest first.
-    pub const ALL: &[Self] = &[Self::Plain, Self::Sse2, Self::Sse41, Self::Avx2];
+    /// Every backend; those of a processor slowest first.
+    pub const ALL: &[Self] = &[Self::Plain, Self::Sse2, Self::Sse41, Self::Avx2, Self::Avx512, Self::Neon, Self::Dsp];
 
     /// Name as it is written in reports.
     pub const fn name(self) -> &'static str {
@@ -60,6 +72,9 @@ impl Backend {
             Self::Sse2 => "sse2",
             Self::Sse41 => "sse4.1",
             Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+            Self::Dsp => "dsp",
         }
     }
 
@@ -68,7 +83,9 @@ impl Backend {
         #[cfg(target_arch = "x86_64")]
         return x86_64::is_available(self);
         #[cfg(not(target_arch = "x86_64"))]
-        return self == Self::Plain;
+        return self == Self::Plain
+            || (cfg!(all(target_arch = "aarch64", target_feature = "neon")) && self == Self::Neon)
+            || (cfg!(dsp) && self == Self::Dsp);
     }
 
     /// The last one of [`Self::ALL`] that is available.
@@ -84,9 +101,19 @@ impl Backend {
     /// Bytes that are worked on at once: tables are padded to a multiple.
     pub(crate) const fn lanes(self) -> usize {
         match self {
-            Self::Plain => 1,
-            Self::Sse2 | Self::Sse41 => 16,
+            Self::Plain | Self::Dsp => 1,
+            Self::Sse2 | Self::Sse41 | Self::Neon => 16,
             Self::Avx2 => 32,
+            Self::Avx512 => 64,
+        }
+    }
+
+    /// Whether its vectors can work on columns of so many disparities.
+    pub(crate) const fn takes(self, disparities: usize) -> bool {
+        match self {
+            #[cfg(dsp)]
+            Self::Dsp => thumb::takes(disparities),
+            _ => disparities > 0,
         }
     }
 
@@ -120,7 +147,11 @@ impl Chosen {
 pub(crate) fn slide_codes(chosen: Chosen, job: SlideCodes<'_>) {
     match chosen.0 {
         #[cfg(target_arch = "x86_64")]
-        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => x86_64::slide_codes(chosen, job),
+        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 | Backend::Avx512 => x86_64::slide_codes(chosen, job),
+        #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+        Backend::Neon => aarch64::slide_codes(job),
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::slide_codes(job),
         _ => plain::slide_codes(job),
     }
 }
@@ -139,59 +170,41 @@ pub(crate) fn slide_grey(
     plain::slide_grey(columns, disparities, min_disparity, enter, leave);
 }
 
-/// The best places of up to [`CHUNK`] pixels of a row, from keys of cost and place: for costs below 512 and places below 128.
+/// The best places of up to [`CHUNK`] pixels of a row, from keys of cost and place.
 ///
 /// # Bound
 /// `pixels x disparities` steps, and as many for each column of the window where the sums are made afresh.
-pub(crate) fn search_keys(
-    chosen: Chosen,
-    search: &Search,
-    limits: &KeyLimits,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Right<'_>,
-    found: &mut Found,
-) {
+pub(crate) fn search_keys(chosen: Chosen, job: KeyJob<'_>) {
     match chosen.0 {
         #[cfg(target_arch = "x86_64")]
-        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
-            x86_64::search_keys(chosen, search, limits, columns, work, right, found);
-        }
-        _ => plain::search_keys(search, limits, columns, work, right, found),
+        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 | Backend::Avx512 => x86_64::search_keys(chosen, job),
+        #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+        Backend::Neon => aarch64::search_keys(job),
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::search_keys(job),
+        _ => plain::search_keys(job),
     }
 }
 
-/// The best places of up to [`CHUNK`] pixels of a row, for sums of bytes whose window sums fit 16 bits. `right` is `None` where
-/// the right pixels are not asked.
+/// The best places of up to [`CHUNK`] pixels of a row, for sums of bytes.
 ///
 /// # Bound
 /// That of [`search_keys`], twice.
-pub(crate) fn search_bytes(
-    chosen: Chosen,
-    search: &Search,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Option<Right<'_>>,
-    found: &mut Found,
-) {
+pub(crate) fn search_bytes(chosen: Chosen, job: CostJob<'_, u8>) {
     match chosen.0 {
         #[cfg(target_arch = "x86_64")]
-        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 => {
-            x86_64::search_costs(chosen, search, columns, work, right, found);
-        }
-        _ => plain::search_costs(search, columns, work, right, found),
+        Backend::Sse2 | Backend::Sse41 | Backend::Avx2 | Backend::Avx512 => x86_64::search_costs(chosen, job),
+        #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+        Backend::Neon => aarch64::search_costs(job),
+        #[cfg(dsp)]
+        Backend::Dsp => thumb::search_costs(job),
+        _ => plain::search_costs(job),
     }
 }
 
 /// As [`search_bytes`], for sums of 16 bits.
-pub(crate) fn search_words(
-    search: &Search,
-    columns: &[[u8; 2]],
-    work: &mut [i16],
-    right: Option<Right<'_>>,
-    found: &mut Found,
-) {
-    plain::search_costs(search, columns, work, right, found);
+pub(crate) fn search_words(job: CostJob<'_, [u8; 2]>) {
+    plain::search_costs(job);
 }
 
 /// Steps in plain Rust that are compiled for the chosen backend. `run`, and what it calls, is to be `inline(always)`: that is why

@@ -1,6 +1,6 @@
 //! Plain Rust: what every other backend is held against.
 
-use super::jobs::{CodeRow, Found, KeyLimits, PAD, Right, Search, SlideCodes};
+use super::jobs::{CodeRow, CostJob, KeyJob, PAD, SlideCodes};
 
 /// A sum over the rows of a window as it lies in a column.
 pub(super) trait Sum: Copy {
@@ -84,14 +84,8 @@ fn slide<S: Copy>(
     }
 }
 
-pub(super) fn search_keys(
-    search: &Search,
-    limits: &KeyLimits,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Right<'_>,
-    found: &mut Found,
-) {
+pub(super) fn search_keys(job: KeyJob<'_>) {
+    let KeyJob { search, limits, columns, work, right, found } = job;
     let disparities = search.disparities;
     let Some(keys) = work.get_mut(PAD..PAD + disparities) else { return };
     let column =
@@ -122,7 +116,7 @@ pub(super) fn search_keys(
             *best = (*best).min(key ^ 0x7f);
         }
         let place = usize::from(least as u16 & 0x7f);
-        let above = limits.above(least);
+        let above = limits.above(least, found.weak(i));
         let near = inside.iter().fold(0u16, |near, &key| near + u16::from(key < above));
         let at = |place: Option<usize>| place.and_then(|place| keys.get(place)).copied().unwrap_or(i16::MAX);
         found.put(i, place, [at(place.checked_sub(1)), least, at(Some(place + 1))], near, above);
@@ -130,13 +124,8 @@ pub(super) fn search_keys(
 }
 
 /// Costs are kept less 32768, because some processors compare signed numbers only.
-pub(super) fn search_costs<S: Sum>(
-    search: &Search,
-    columns: &[S],
-    work: &mut [i16],
-    mut right: Option<Right<'_>>,
-    found: &mut Found,
-) {
+pub(super) fn search_costs<S: Sum>(job: CostJob<'_, S>) {
+    let CostJob { search, columns, work, mut right, found } = job;
     let disparities = search.disparities;
     let Some(costs) = work.get_mut(PAD..PAD + disparities) else { return };
     let column =
@@ -163,7 +152,7 @@ pub(super) fn search_costs<S: Sum>(
         }
         let least = inside.iter().fold(i16::MAX, |least, &cost| least.min(cost));
         let place = candidates.start + inside.iter().position(|&cost| cost == least).unwrap_or(0);
-        let above = search.above(least);
+        let above = search.above(least, found.weak(i));
         let near = inside.iter().fold(0u16, |near, &cost| near + u16::from(cost < above));
         let at = |place: Option<usize>| place.and_then(|place| costs.get(place)).copied().unwrap_or(i16::MAX);
         found.put(i, place, [at(place.checked_sub(1)), least, at(Some(place + 1))], near, above);

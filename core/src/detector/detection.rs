@@ -132,12 +132,8 @@ impl Statistics {
         surfaces: &[Surface],
         map: &ObstacleMap<CELLS>,
     ) {
-        for pixel in picture.pixels() {
-            match pixel.get() {
-                Ok(_) => self.pixels_with_disparity += 1,
-                Err(reason) => self.pixels_without[reason as usize] += 1,
-            }
-        }
+        let (with, without) = picture.counts();
+        (self.pixels_with_disparity, self.pixels_without) = (with, without);
         self.surfaces = surfaces.len() as u32;
         self.surfaces_dropped = report.dropped;
         for surface in surfaces {

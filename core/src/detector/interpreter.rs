@@ -2,6 +2,7 @@
 
 use super::{Detection, MemoryPart, Probe, Setup, Stage};
 use crate::{
+    arch::Chosen,
     disparity::DisparityPicture,
     error::ConfigError,
     geometry::DepthTable,
@@ -112,6 +113,12 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
         self.detectors = Detectors::new(settings.detector, settings.cross_check);
         self.confidence = settings.confidence;
         Ok(())
+    }
+
+    /// Has the stages run with the instructions of a backend.
+    pub(super) const fn choose(&mut self, chosen: Chosen) {
+        self.surfaces.choose(chosen);
+        self.map.choose(chosen);
     }
 
     /// Forgets the ground of earlier frames.

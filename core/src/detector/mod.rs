@@ -10,7 +10,7 @@ pub use memory::{Capacities, MemoryPart, memory_bytes};
 pub use stage::{Probe, Stage};
 
 use crate::{
-    arch::Backend,
+    arch::{Backend, Chosen},
     disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
     geometry::{Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
@@ -144,6 +144,11 @@ impl<
             sector_width_deg: settings.map.sector_width_deg,
         };
         self.interpreter.configure(settings, &setup, mount.height_m.is_some())?;
+        let chosen = Chosen::new(self.matcher.backend()).unwrap_or(Chosen::PLAIN);
+        self.rectifier.choose(chosen);
+        self.surface_size.choose(chosen);
+        self.content.choose(chosen);
+        self.interpreter.choose(chosen);
         settings.health.check()?;
         self.health = settings.health;
         self.forget_pictures();
@@ -152,7 +157,7 @@ impl<
         Ok(())
     }
 
-    /// Chooses whose instructions the matcher uses from the next [`Self::configure`] on; without this those of the fastest
+    /// Chooses whose instructions the inner loops use from the next [`Self::configure`] on; without this those of the fastest
     /// backend that the processor has. Says whether it has them; if not, nothing changes. No result depends on it.
     pub fn set_backend(&mut self, backend: Backend) -> bool {
         self.matcher.set_backend(backend)

@@ -71,6 +71,30 @@ impl<const DISPARITIES: usize> DepthTable<DISPARITIES> {
         self.inverse(steps) as f32 * self.scale_m
     }
 
+    /// [`Self::inverse`] of pixels side by side that all are [`Self::covered`]; of others it gives any of the distances.
+    #[inline(always)]
+    pub(crate) fn inverses<const N: usize>(&self, steps: &[u16; N]) -> [u32; N] {
+        let entries = self.inverse.as_flattened();
+        let mut inverses = [0; N];
+        for (inverse, steps) in inverses.iter_mut().zip(steps) {
+            // Of a known range, so that it is not checked once more.
+            let place = usize::from(steps.wrapping_sub(self.base_steps)).min((16 * DISPARITIES).saturating_sub(1));
+            *inverse = entries.get(place).copied().unwrap_or(0);
+        }
+        inverses
+    }
+
+    /// [`Self::distance_m`] of pixels side by side, as [`Self::inverses`].
+    #[inline(always)]
+    pub(crate) fn distances_m<const N: usize>(&self, steps: &[u16; N]) -> [f32; N] {
+        let mut distances_m = [0.0; N];
+        for (distance_m, inverse) in distances_m.iter_mut().zip(self.inverses(steps)) {
+            // Below 2^31: signed numbers are what vector instructions turn into floating point.
+            *distance_m = inverse as i32 as f32 * self.scale_m;
+        }
+        distances_m
+    }
+
     /// Focal length times baseline, px m: the distance at a disparity of 1 px.
     pub fn focal_baseline_px_m(&self) -> f32 {
         self.scale_m * (INVERSE_ONE / 16.0)

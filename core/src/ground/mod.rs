@@ -215,9 +215,10 @@ impl GroundFinder {
         frame: &VehicleFrame,
         height: Height,
     ) -> Option<GroundPlane> {
+        let noise = self.noise(table.iter().filter(|surface| self.tells_plane(surface, height)));
         let mut best: Option<(f32, GroundPlane)> = None;
         let mut attempt = |seed: Option<GroundPlane>| {
-            let grown = seed.and_then(|seed| self.grow(seed, table, frame, height));
+            let grown = seed.and_then(|seed| self.grow(seed, table, frame, height, &noise));
             if let Some((weight, plane)) = grown.filter(|(weight, _)| best.is_none_or(|(most, _)| *weight > most)) {
                 best = Some((weight, plane));
             }
@@ -254,20 +255,20 @@ impl GroundFinder {
         table: &[Surface],
         frame: &VehicleFrame,
         height: Height,
+        noise: &Noise,
     ) -> Option<(f32, GroundPlane)> {
         let mut weight = 0.0;
         for round in 0..REFINEMENTS {
             // A first plane may be bent by what is not ground, or come from an earlier frame: it is forgiven more.
             let tolerance = self.settings.fit_tolerance_m * if round == 0 { 2.5 } else { 1.0 };
             let near = |surface: &Surface| plane.height_m(surface.points.mean_m).abs() <= tolerance;
-            let on_it = table.iter().filter(|surface| self.tells_plane(surface, height) && near(surface));
-            let noise_per_m = self.noise_per_m(table.iter().filter(|surface| self.tells_plane(surface, height)));
-            let noise_per_m = noise_per_m.min(self.most_noise_per_m);
+            let tells =
+                |surface: &&Surface| self.tells_plane(surface, height) && near(surface) && noise.allows(surface);
             let mut support = 0;
             let mut points = Scatter::default();
-            for surface in on_it {
+            for surface in table.iter().filter(tells) {
                 support += surface.pixels();
-                points = points.joined(&self.weighed(surface, noise_per_m));
+                points = points.joined(&self.weighed(surface, noise.shift_per_m));
             }
             plane = GroundPlane { support, ..GroundPlane::through(&points, frame)? };
             weight = points.weight;
@@ -301,21 +302,23 @@ impl GroundFinder {
         Scatter { weight, covariance, ..surface.points }
     }
 
-    /// How far disparities that err by what is seen of it move a point along its ray, in parts of its distance and for each metre of
-    /// it: the mean over `surfaces` of how far their points lie off their planes.
-    fn noise_per_m<'a>(&self, surfaces: impl Iterator<Item = &'a Surface>) -> f32 {
+    /// What `surfaces` say of the error of a disparity: the quadratic mean over how far their points lie off their planes, because it
+    /// is squares that the spread of the ground is made of.
+    fn noise<'a>(&self, surfaces: impl Iterator<Item = &'a Surface>) -> Noise {
         let camera_m = self.frame.map_or([0.0; 3], |frame| frame.point([0.0; 3]));
         let (mut sum, mut weight) = (0.0, 0.0);
         for surface in surfaces {
-            let ray: [f32; 3] = core::array::from_fn(|i| surface.points.mean_m[i] - camera_m[i]);
-            let range_m = libm::sqrtf(ray.iter().map(|r| r * r).sum());
-            let across_m = (0..3).map(|i| surface.normal[i] * ray[i]).sum::<f32>().abs();
-            if across_m > LEAST_HEIGHT_M {
-                sum += surface.points.weight * surface.rms_m / (across_m * range_m);
+            if let Some(shift_per_m) = shift_per_m(surface, camera_m) {
+                sum += surface.points.weight * shift_per_m * shift_per_m;
                 weight += surface.points.weight;
             }
         }
-        if weight > 0.0 { sum / weight } else { 0.0 }
+        let shift_per_m = if weight > 0.0 { libm::sqrtf(sum / weight) } else { 0.0 };
+        Noise {
+            camera_m,
+            most_per_m: self.settings.fit_roughness * shift_per_m,
+            shift_per_m: shift_per_m.min(self.most_noise_per_m),
+        }
     }
 
     fn lies_on(&self, plane: &GroundPlane, surface: &Surface) -> bool {
@@ -351,6 +354,29 @@ impl GroundFinder {
         let pixels: u32 = table.iter().filter(below).map(Surface::pixels).sum();
         pixels as f32 <= MOST_BELOW * plane.support as f32
     }
+}
+
+/// The error of disparities, as shifts of a point along its ray, in parts of its distance and for each metre of it.
+struct Noise {
+    camera_m: [f32; 3],
+    /// What is taken out of the spread of a surface.
+    shift_per_m: f32,
+    /// What lies farther off its plane than this is no piece of ground alone.
+    most_per_m: f32,
+}
+
+impl Noise {
+    fn allows(&self, surface: &Surface) -> bool {
+        shift_per_m(surface, self.camera_m).is_none_or(|shift_per_m| shift_per_m <= self.most_per_m)
+    }
+}
+
+/// How far a surface's points lie off its plane, as [`Noise`] says it; `None` where the plane leads to the camera.
+fn shift_per_m(surface: &Surface, camera_m: [f32; 3]) -> Option<f32> {
+    let ray: [f32; 3] = core::array::from_fn(|i| surface.points.mean_m[i] - camera_m[i]);
+    let range_m = libm::sqrtf(ray.iter().map(|r| r * r).sum());
+    let across_m = (0..3).map(|i| surface.normal[i] * ray[i]).sum::<f32>().abs();
+    (across_m > LEAST_HEIGHT_M).then(|| surface.rms_m / (across_m * range_m))
 }
 
 /// What is taken for known about the height of the camera.

@@ -18,6 +18,9 @@ pub struct GroundSettings {
     /// as much of it as the surfaces' points lie off their planes is taken out of their spread, and never more than this, px: points
     /// lie off their planes for other reasons, too.
     pub fit_noise_max_px: f32,
+    /// A surface whose points lie this many times as far off its plane as those of the surfaces in the mean has something else on it,
+    /// as the foot of a wall: it has no say in the plane.
+    pub fit_roughness: f32,
     /// A surface belongs to the ground if its middle lies within this distance of the plane, metres.
     pub surface_tolerance_m: f32,
     /// Allowance on top of it for each metre of range, metres: distances are less certain there, and the ground bends.
@@ -50,6 +53,7 @@ impl GroundSettings {
         height_tolerance_m: 0.0,
         fit_tolerance_m: 0.0,
         fit_noise_max_px: 0.0,
+        fit_roughness: 0.0,
         surface_tolerance_m: 0.0,
         surface_tolerance_per_m: 0.0,
         max_range_m: 0.0,
@@ -72,6 +76,7 @@ impl GroundSettings {
         ConfigError::check("ground.height_tolerance_m", self.height_tolerance_m, 0.0, 20.0)?;
         ConfigError::check("ground.fit_tolerance_m", self.fit_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.fit_noise_max_px", self.fit_noise_max_px, 0.0, 4.0)?;
+        ConfigError::check("ground.fit_roughness", self.fit_roughness, 1.0, 1000.0)?;
         ConfigError::check("ground.surface_tolerance_m", self.surface_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.surface_tolerance_per_m", self.surface_tolerance_per_m, 0.0, 0.5)?;
         ConfigError::check("ground.max_range_m", self.max_range_m, 1.0, 1000.0)?;
@@ -93,6 +98,7 @@ impl Default for GroundSettings {
             height_tolerance_m: 0.5,
             fit_tolerance_m: 0.05,
             fit_noise_max_px: 0.7,
+            fit_roughness: 1.5,
             surface_tolerance_m: 0.06,
             surface_tolerance_per_m: 0.01,
             max_range_m: 25.0,

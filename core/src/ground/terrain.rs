@@ -4,7 +4,8 @@ use super::GroundPlane;
 use crate::{
     disparity::DisparityPicture,
     geometry::{DepthTable, Rays},
-    surfaces::{SurfaceClass, Surfaces},
+    lanes::floor,
+    surfaces::{SurfaceClass, Surfaces, TILE},
 };
 
 /// Patches ahead, and to both sides together.
@@ -14,6 +15,8 @@ const ACROSS: usize = 40;
 /// Of so many pixels along and across the rows one is looked at.
 const STEP_X: usize = 4;
 const STEP_Y: usize = 2;
+
+const _: () = assert!(TILE.is_multiple_of(STEP_X), "the first pixel of a tile is one that is looked at");
 
 /// Pixels that the plane itself counts for under the robot, where the ground is too near to be seen.
 const PLANE_WEIGHT: f32 = 25.0;
@@ -66,7 +69,7 @@ impl Terrain {
     pub const fn new() -> Self {
         Self {
             plane: GroundPlane::UNSET,
-            patch_m: 1.0,
+            patch_m: 0.0,
             lift_m: [[0.0; ACROSS]; AHEAD],
             weight: [[0.0; ACROSS]; AHEAD],
             sum_m: [[0.0; ACROSS]; AHEAD],
@@ -79,6 +82,10 @@ impl Terrain {
     /// One pass over the patches.
     pub fn flatten(&mut self, plane: GroundPlane) {
         self.plane = plane;
+        if self.patch_m == 0.0 {
+            // Any length does where nothing bends; a detector that is not configured is all zero.
+            self.patch_m = 1.0;
+        }
         for lift_m in &mut self.lift_m {
             lift_m.fill(0.0);
         }
@@ -100,19 +107,29 @@ impl Terrain {
     ) {
         self.flatten(plane);
         self.patch_m = bend.patch_m;
+        // The surfaces of another picture say nothing about this one.
+        let height = if (picture.width(), picture.height()) == surfaces.size() { picture.height() } else { 0 };
         for round in [Round::Follow, Round::Trim, Round::Trim] {
             self.begin();
-            for y in (0..picture.height()).rev().step_by(STEP_Y) {
-                for (x, pixel) in picture.row(y).iter().enumerate().step_by(STEP_X) {
-                    if !pixel.has_value() {
+            for y in (0..height).rev().step_by(STEP_Y) {
+                let (row, labels) = (picture.row(y), surfaces.labels_row(y));
+                for (x0, (pixels, labels)) in (0..).step_by(TILE).zip(row.chunks(TILE).zip(labels.chunks(TILE))) {
+                    let table = surfaces.of_tile(x0, y);
+                    if table.is_empty() {
                         continue;
                     }
-                    let surface = surfaces.surface_at(x, y).filter(|surface| surface.class != SurfaceClass::Vertical);
-                    let Some(surface) = surface else { continue };
-                    let z = depth.distance_m(pixel.steps());
-                    let direction = rays.direction(x as f32, y as f32);
-                    let point: [f32; 3] = core::array::from_fn(|i| rays.origin_m[i] + z * direction[i]);
-                    self.add(round, point, surface.class == SurfaceClass::Ground, bend);
+                    for (i, (pixels, labels)) in pixels.chunks(STEP_X).zip(labels.chunks(STEP_X)).enumerate() {
+                        let (Some(pixel), Some(&label)) = (pixels.first(), labels.first()) else { continue };
+                        let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(i));
+                        let Some(surface) = surface.filter(|surface| surface.class != SurfaceClass::Vertical) else {
+                            continue;
+                        };
+                        let x = x0 + i * STEP_X;
+                        let z = depth.distance_m(pixel.steps());
+                        let direction = rays.direction(x as f32, y as f32);
+                        let point: [f32; 3] = core::array::from_fn(|i| rays.origin_m[i] + z * direction[i]);
+                        self.add(round, point, surface.class == SurfaceClass::Ground, bend);
+                    }
                 }
             }
             self.settle(bend.share);
@@ -212,13 +229,38 @@ impl Terrain {
 
     /// How far the ground lies above the plane `x_m` ahead and `y_m` to the left, metres.
     pub fn lift_m(&self, x_m: f32, y_m: f32) -> f32 {
-        let [ahead, across] = self.place(x_m, y_m);
-        let ahead = (ahead - 0.5).clamp(0.0, (AHEAD - 1) as f32);
-        let across = (across - 0.5).clamp(0.0, (ACROSS - 1) as f32);
-        let (i, j) = ((ahead as usize).min(AHEAD - 2), (across as usize).min(ACROSS - 2));
-        let (s, t) = (ahead - i as f32, across - j as f32);
-        let [near, far] = [self.lift_m[i], self.lift_m[i + 1]].map(|row| row[j] + t * (row[j + 1] - row[j]));
-        near + s * (far - near)
+        let [lift_m] = self.lifts_m(&[x_m], &[y_m]);
+        lift_m
+    }
+
+    /// [`Self::lift_m`] of several places side by side.
+    #[inline(always)]
+    pub(crate) fn lifts_m<const N: usize>(&self, x_m: &[f32; N], y_m: &[f32; N]) -> [f32; N] {
+        let (mut corners, mut parts) = ([0; N], [[0.0; 2]; N]);
+        for k in 0..N {
+            let [ahead, across] = self.place(x_m[k], y_m[k]);
+            let (most_ahead, most_across) = ((AHEAD - 1) as f32, (ACROSS - 1) as f32);
+            let (ahead, across) = ((ahead - 0.5).clamp(0.0, most_ahead), (across - 0.5).clamp(0.0, most_across));
+            let (i, j) = (floor(ahead, 0.0, most_ahead - 1.0), floor(across, 0.0, most_across - 1.0));
+            parts[k] = [ahead - i as f32, across - j as f32];
+            corners[k] = i * ACROSS as i32 + j;
+        }
+        // The four patches around each place, one after the other: no vector instruction of all processors does it.
+        let lift_m = self.lift_m.as_flattened();
+        let mut around = [[0.0; N]; 4];
+        for k in 0..N {
+            let corner = (corners[k] as usize).min((AHEAD - 1) * ACROSS - 2);
+            for (patches, offset) in around.iter_mut().zip([0, 1, ACROSS, ACROSS + 1]) {
+                patches[k] = lift_m.get(corner + offset).copied().unwrap_or(0.0);
+            }
+        }
+        let mut lifts_m = [0.0; N];
+        for k in 0..N {
+            let ([s, t], [a, b, c, d]) = (parts[k], [around[0][k], around[1][k], around[2][k], around[3][k]]);
+            let (near, far) = (a + t * (b - a), c + t * (d - c));
+            lifts_m[k] = near + s * (far - near);
+        }
+        lifts_m
     }
 
     /// Height of a point of the vehicle frame above the ground, metres.
@@ -227,6 +269,7 @@ impl Terrain {
     }
 
     /// Where a point lies, in patches from the nearest and from the rightmost one.
+    #[inline(always)]
     fn place(&self, x_m: f32, y_m: f32) -> [f32; 2] {
         [x_m / self.patch_m, y_m / self.patch_m + (ACROSS / 2) as f32]
     }

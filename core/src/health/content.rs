@@ -7,6 +7,7 @@ use super::{
     tiles::{Covering, Tiles},
 };
 use crate::{
+    arch::{self, Chosen, Steps},
     disparity::DisparityPixel,
     matching::{Matcher, ValidSpan},
 };
@@ -23,6 +24,7 @@ pub(crate) struct Content<const WIDTH: usize> {
     height: usize,
     range: SearchRange,
     next_strip: usize,
+    chosen: Chosen,
 }
 
 /// The signs that lie in the pictures themselves.
@@ -55,7 +57,14 @@ impl<const WIDTH: usize> Content<WIDTH> {
             height: 0,
             range: SearchRange { first: 0, last: 0 },
             next_strip: 0,
+            chosen: Chosen::PLAIN,
         }
+    }
+
+    /// Has rows looked at with the instructions of a backend.
+    pub(crate) const fn choose(&mut self, chosen: Chosen) {
+        self.chosen = chosen;
+        self.sparse.choose(chosen);
     }
 
     /// Forgets the pictures of before.
@@ -78,6 +87,11 @@ impl<const WIDTH: usize> Content<WIDTH> {
     /// # Bound
     /// Three passes over each of the rows.
     pub(crate) fn push(&mut self, y: usize, rows: [&[u8]; 2], spans: [ValidSpan; 2]) {
+        arch::compiled(self.chosen, PushRow { content: self, y, rows, spans });
+    }
+
+    #[inline(always)]
+    fn take(&mut self, y: usize, rows: [&[u8]; 2], spans: [ValidSpan; 2]) {
         for (side, (row, span)) in rows.into_iter().zip(spans).enumerate() {
             if let (Some(tiles), Some(profile)) = (self.tiles.get_mut(side), self.profiles.get_mut(side)) {
                 tiles.push(y, row, span);
@@ -129,6 +143,21 @@ impl<const WIDTH: usize> Content<WIDTH> {
             pairing: self.pairing.compare(&self.profiles),
             rows: self.sparse.sign(),
         }
+    }
+}
+
+/// A row of both pictures.
+struct PushRow<'a, const WIDTH: usize> {
+    content: &'a mut Content<WIDTH>,
+    y: usize,
+    rows: [&'a [u8]; 2],
+    spans: [ValidSpan; 2],
+}
+
+impl<const WIDTH: usize> Steps for PushRow<'_, WIDTH> {
+    #[inline(always)]
+    fn run(self) {
+        self.content.take(self.y, self.rows, self.spans);
     }
 }
 

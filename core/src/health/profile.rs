@@ -60,6 +60,7 @@ impl Profile {
     ///
     /// # Bound
     /// Two passes over the row.
+    #[inline(always)]
     pub(super) fn push(&mut self, y: usize, row: &[u8], span: ValidSpan) {
         let valid = row.get(usize::from(span.start)..usize::from(span.end)).unwrap_or_default();
         let band = y / self.rows_per_band.max(1);

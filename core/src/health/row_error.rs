@@ -1,10 +1,14 @@
 //! Sparse matches that look above and below the row, and nearer than the disparity range.
 
-use core::array::from_fn;
+use core::{
+    array::from_fn,
+    ops::{Range, RangeInclusive},
+};
 
 use heapless::Vec;
 
 use crate::{
+    arch::{self, Chosen, Steps},
     disparity::{DisparityPixel, Reason},
     matching::{Strip, refine},
 };
@@ -57,6 +61,7 @@ pub(crate) struct SparseMatches {
     /// Places in the lower half, and those among them that match nearer than the range by far the best.
     lower: u16,
     near: u16,
+    chosen: Chosen,
 }
 
 /// What the sparse matches say of the rows and of the near zone.
@@ -79,7 +84,12 @@ pub(crate) struct SearchRange {
 
 impl SparseMatches {
     pub(crate) const fn new() -> Self {
-        Self { errors: Vec::new(), searches_left: 0, lower: 0, near: 0 }
+        Self { errors: Vec::new(), searches_left: 0, lower: 0, near: 0, chosen: Chosen::PLAIN }
+    }
+
+    /// Has patches compared with the instructions of a backend.
+    pub(crate) const fn choose(&mut self, chosen: Chosen) {
+        self.chosen = chosen;
     }
 
     /// Starts a picture.
@@ -107,7 +117,7 @@ impl SparseMatches {
         let width = end.saturating_sub(start);
         for place in 0..PLACES {
             let part = start + width * place / PLACES..start + width * (place + 1) / PLACES;
-            if let Some(x) = most_contrast(strip, row, part) {
+            if let Some(x) = most_contrast(self.chosen, strip, row, part) {
                 self.look_at(strip, x, row.get(x).copied().unwrap_or_default(), range, lower);
             }
         }
@@ -124,10 +134,10 @@ impl SparseMatches {
         let known = pixel.has_value().then(|| usize::from((pixel.steps() + 8) >> 4));
         if lower {
             let within = match known {
-                Some(disparity) => best_along(strip, x, disparity.saturating_sub(1)..=disparity + 1),
-                None => best_along(strip, x, range.first..=range.last),
+                Some(disparity) => best_along(self.chosen, strip, x, disparity.saturating_sub(1)..=disparity + 1),
+                None => best_along(self.chosen, strip, x, range.first..=range.last),
             };
-            let nearer = best_along(strip, x, range.last..=NEARER * range.last);
+            let nearer = best_along(self.chosen, strip, x, range.last..=NEARER * range.last);
             self.lower += 1;
             self.near += u16::from(nearer.is_some_and(|(cost, _)| within.is_none_or(|(best, _)| 2 * cost < best)));
         }
@@ -135,13 +145,14 @@ impl SparseMatches {
             Some(disparity) => disparity,
             None if self.searches_left > 0 => {
                 self.searches_left -= 1;
-                let rows = (0..=2 * REACH).filter_map(|down| best_at(strip, x, range.first..=range.last, down));
+                let chosen = self.chosen;
+                let rows = (0..=2 * REACH).filter_map(|down| best_at(chosen, strip, x, range.first..=range.last, down));
                 let Some((_, disparity)) = rows.min() else { return };
                 disparity
             }
             None => return,
         };
-        if let Some(error) = row_error(strip, x, disparity) {
+        if let Some(error) = row_error(self.chosen, strip, x, disparity) {
             // Cannot fail: there is room for every place.
             let _ = self.errors.push(error);
         }
@@ -172,10 +183,33 @@ fn middle_of(errors: &[i16]) -> i16 {
 /// The place with the most contrast both along and across the row. Whether it has a disparity must not count: where rows are out
 /// of line, those have one that do not show it.
 fn most_contrast(
+    chosen: Chosen,
     strip: &Strip<'_, { 2 * MARGIN + 1 }>,
     row: &[DisparityPixel],
-    part: core::ops::Range<usize>,
+    part: Range<usize>,
 ) -> Option<usize> {
+    let mut place = None;
+    arch::compiled(chosen, MostContrast { strip, row, part, place: &mut place });
+    place
+}
+
+/// The steps of [`most_contrast`].
+struct MostContrast<'a> {
+    strip: &'a Strip<'a, { 2 * MARGIN + 1 }>,
+    row: &'a [DisparityPixel],
+    part: Range<usize>,
+    place: &'a mut Option<usize>,
+}
+
+impl Steps for MostContrast<'_> {
+    #[inline(always)]
+    fn run(self) {
+        *self.place = contrasts(self.strip, self.row, self.part);
+    }
+}
+
+#[inline(always)]
+fn contrasts(strip: &Strip<'_, { 2 * MARGIN + 1 }>, row: &[DisparityPixel], part: Range<usize>) -> Option<usize> {
     let rows = [MARGIN - 1, MARGIN, MARGIN + 1].map(|y| strip.left.get(y).copied().unwrap_or_default());
     let mut best = (0, None);
     for first in part.clone().step_by(LANES) {
@@ -201,6 +235,7 @@ fn most_contrast(
 }
 
 /// `N` bytes of `row` from `first` on; 0 beyond its end.
+#[inline(always)]
 fn window<const N: usize>(row: &[u8], first: usize) -> [u8; N] {
     let bytes = row.get(first..).unwrap_or_default();
     if let Some(whole) = bytes.first_chunk::<N>() {
@@ -212,11 +247,11 @@ fn window<const N: usize>(row: &[u8], first: usize) -> [u8; N] {
 }
 
 /// The row in which the right picture shows the patch at `x`, against that of the left, 1/16 px; `None` if that cannot be told.
-fn row_error(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, disparity: usize) -> Option<i16> {
+fn row_error(chosen: Chosen, strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, disparity: usize) -> Option<i16> {
     let disparities = disparity.saturating_sub(ALONG)..=disparity + ALONG;
     let mut costs = [u32::MAX; 2 * REACH + 1];
     for (down, cost) in costs.iter_mut().enumerate() {
-        *cost = best_at(strip, x, disparities.clone(), down)?.0;
+        *cost = best_at(chosen, strip, x, disparities.clone(), down)?.0;
     }
     let (best, cost) = costs.iter().copied().enumerate().min_by_key(|(_, cost)| *cost)?;
     let aside = [best.checked_sub(2), best.checked_add(2)].map(|place| place.and_then(|place| costs.get(place)));
@@ -229,18 +264,49 @@ fn row_error(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, disparity: usize) 
 
 /// The least cost along the row itself, and its disparity.
 fn best_along(
+    chosen: Chosen,
     strip: &Strip<'_, { 2 * MARGIN + 1 }>,
     x: usize,
-    disparities: core::ops::RangeInclusive<usize>,
+    disparities: RangeInclusive<usize>,
 ) -> Option<(u32, usize)> {
-    best_at(strip, x, disparities, REACH)
+    best_at(chosen, strip, x, disparities, REACH)
 }
 
 /// The least cost of the patch at `x` of the left picture, `down - REACH` rows lower in the right one, and its disparity.
 fn best_at(
+    chosen: Chosen,
     strip: &Strip<'_, { 2 * MARGIN + 1 }>,
     x: usize,
-    disparities: core::ops::RangeInclusive<usize>,
+    disparities: RangeInclusive<usize>,
+    down: usize,
+) -> Option<(u32, usize)> {
+    let mut best = None;
+    arch::compiled(chosen, BestAt { strip, x, disparities, down, best: &mut best });
+    best
+}
+
+/// The steps of [`best_at`].
+struct BestAt<'a> {
+    strip: &'a Strip<'a, { 2 * MARGIN + 1 }>,
+    x: usize,
+    disparities: RangeInclusive<usize>,
+    down: usize,
+    best: &'a mut Option<(u32, usize)>,
+}
+
+impl Steps for BestAt<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { strip, x, disparities, down, best } = self;
+        *best = least_cost(strip, x, &disparities, down);
+    }
+}
+
+#[inline(always)]
+fn least_cost(
+    strip: &Strip<'_, { 2 * MARGIN + 1 }>,
+    x: usize,
+    disparities: &RangeInclusive<usize>,
     down: usize,
 ) -> Option<(u32, usize)> {
     // Places in the right picture whose patch is valid and whose disparity is asked for.
@@ -265,6 +331,7 @@ fn best_at(
 
 /// Sums of the absolute differences of the patch at `x` of the left picture and each of [`LANES`] patches of the right one, from
 /// that at `there` on.
+#[inline(always)]
 fn costs(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, there: usize, down: usize) -> [u16; LANES] {
     let mut costs = [0u16; LANES];
     let rows = strip.left.iter().skip(REACH).zip(strip.right.iter().skip(down)).take(2 * RADIUS + 1);

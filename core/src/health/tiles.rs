@@ -72,6 +72,7 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
     ///
     /// # Bound
     /// One pass over the row.
+    #[inline(always)]
     pub(super) fn push(&mut self, y: usize, row: &[u8], span: ValidSpan) {
         // Blocks that are valid as a whole.
         let (first, end) = (usize::from(span.start).div_ceil(BLOCK), usize::from(span.end) / BLOCK);
@@ -94,6 +95,7 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
     }
 
     /// Compares the blocks of one row of blocks, and begins the next.
+    #[inline(always)]
     fn end_blocks(&mut self, row: usize, count: usize) {
         let Layout { across, down, columns, .. } = self.layout;
         let blocks = self.blocks.get_mut(..count).unwrap_or_default();

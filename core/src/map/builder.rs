@@ -1,12 +1,16 @@
 //! From classified surfaces to cells.
 
-use super::{Cell, CellState, MapGeometry, MapSettings, ObstacleMap, UnknownReason, cells::floor, shadow, smear};
+use super::{
+    Cell, CellState, MapGeometry, MapSettings, ObstacleMap, UnknownReason, shadow, smear,
+    votes::{Collect, Common},
+};
 use crate::{
+    arch::{self, Chosen},
     disparity::{DisparityPicture, Reason},
     error::ConfigError,
     geometry::{DepthTable, Place, Rays, RectifiedPair, VehicleFrame},
     ground::Terrain,
-    surfaces::{Surface, SurfaceClass, Surfaces, TILE},
+    surfaces::{MAX_TILE_SURFACES, Surfaces},
 };
 
 /// How the left camera sees the world.
@@ -51,29 +55,6 @@ pub(crate) enum Vote {
     },
 }
 
-/// What a pixel counts as, once for each run of pixels of one surface.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Role {
-    Nothing,
-    /// Ground, and what may stand on it in the same tile: each pixel speaks for itself.
-    Ground,
-    Obstacle,
-    Other,
-}
-
-impl Role {
-    const fn of(surface: &Surface) -> Self {
-        match surface.class {
-            SurfaceClass::Obstacle => Self::Obstacle,
-            SurfaceClass::Ground => Self::Ground,
-            _ => Self::Other,
-        }
-    }
-}
-
-/// Distance over which the slope of the ground is measured, metres.
-const SLOPE_STEP_M: f32 = 1.5;
-
 /// Turns the points of surfaces into cells.
 ///
 /// Source: the paper, section 4.4, last step. A pixel is a vote; how many votes a cell needs follows from its distance, because
@@ -85,13 +66,22 @@ pub struct MapBuilder<const CELLS: usize> {
     settings: MapSettings,
     obstacle_heights_m: (f32, f32),
     evidence: [Evidence; CELLS],
+    /// Of the surfaces of one tile.
+    common: [Common; MAX_TILE_SURFACES],
+    chosen: Chosen,
 }
 
 impl<const CELLS: usize> MapBuilder<CELLS> {
     /// A stage that is not configured.
     pub const fn new() -> Self {
         const NOTHING: Evidence = Evidence { obstacle: 0, ground: 0, unclear: 0, height_dm: 0 };
-        Self { settings: MapSettings::UNSET, obstacle_heights_m: (0.0, 0.0), evidence: [NOTHING; CELLS] }
+        Self {
+            settings: MapSettings::UNSET,
+            obstacle_heights_m: (0.0, 0.0),
+            evidence: [NOTHING; CELLS],
+            common: [Common::UNSET; MAX_TILE_SURFACES],
+            chosen: Chosen::PLAIN,
+        }
     }
 
     /// Takes settings, and the least height and the clearance of obstacles, metres.
@@ -103,6 +93,11 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         self.settings = *settings;
         self.obstacle_heights_m = obstacle_heights_m;
         Ok(())
+    }
+
+    /// Has the votes collected with the instructions of a backend.
+    pub(crate) const fn choose(&mut self, chosen: Chosen) {
+        self.chosen = chosen;
     }
 
     /// Fills `map`. Without a ground plane nothing is free, and obstacles are measured from the plane of the mount.
@@ -117,11 +112,14 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
     ) {
         self.begin();
         // The surfaces of another picture say nothing about this one.
-        let height = if (picture.width(), picture.height()) == surfaces.size() { picture.height() } else { 0 };
-        for y in 0..height {
-            for x in (0..picture.width()).step_by(TILE) {
-                self.collect(surfaces, picture, view, ground, (x, y));
-            }
+        if (picture.width(), picture.height()) == surfaces.size() {
+            let Self { settings, obstacle_heights_m, evidence, common, chosen } = self;
+            let evidence = &mut evidence[..settings.geometry.len()];
+            let obstacle_heights_m = *obstacle_heights_m;
+            arch::compiled(
+                *chosen,
+                Collect { settings, obstacle_heights_m, evidence, common, surfaces, picture, view, ground },
+            );
         }
         self.finish(picture, view, ground, ground_seen, map, |_, cell| cell);
     }
@@ -174,88 +172,6 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         }
         smear::take_out(map, view.place, &self.settings);
         shadow::mark(map, view.place);
-    }
-
-    /// Collects the votes of one row of one tile.
-    fn collect<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
-        &mut self,
-        surfaces: &Surfaces<PIXELS, SURFACES>,
-        picture: DisparityPicture<'_>,
-        view: &View<'_, DISPARITIES>,
-        ground: &Terrain,
-        (x0, y): (usize, usize),
-    ) {
-        let end = (x0 + TILE).min(picture.width());
-        let labels = &surfaces.labels_row(y)[x0..end];
-        if labels.iter().all(|&label| label == 0) {
-            return;
-        }
-        let first = surfaces.first_of_tile(x0, y);
-        let table = surfaces.table();
-        let (min_height, clearance) = self.obstacle_heights_m;
-        let per_cell = 1.0 / self.settings.geometry.cell_size_m();
-        let plane = ground.plane();
-        let camera_height = plane.height_m(view.rays.origin_m);
-        let mut direction = view.rays.direction(x0 as f32, y as f32);
-        let step = view.rays.along_row;
-        let rise = |d: [f32; 3]| d[0] * plane.normal[0] + d[1] * plane.normal[1] + d[2] * plane.normal[2];
-        let (mut climb, climb_step) = (rise(direction), rise(step));
-        let (mut current, mut role, mut noise_per_m2) = (0, Role::Nothing, 0.0);
-        for (pixel, &label) in picture.row(y)[x0..end].iter().zip(labels) {
-            if label != current {
-                current = label;
-                let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(first + i));
-                role = surface.map_or(Role::Nothing, Role::of);
-                noise_per_m2 =
-                    surface.map_or(0.0, |surface| self.height_noise_per_m2(surface, view, ground, direction));
-            }
-            if role != Role::Nothing {
-                let z = view.depth.distance_m(pixel.steps());
-                let x = view.rays.origin_m[0] + z * direction[0];
-                let y = view.rays.origin_m[1] + z * direction[1];
-                let height = camera_height + z * climb - ground.lift_m(x, y);
-                let noise = noise_per_m2 * (x * x + y * y);
-                let [i, j] = view.place.to_vehicle([x, y]).map(|metres| floor(metres * per_cell));
-                if let Some(evidence) = self.settings.geometry.index(i, j).map(|i| &mut self.evidence[i]) {
-                    let too_high = height > self.settings.free_max_height_m.max(noise);
-                    // Ground that lies deeper than expected is a drop, or the top of what stands below.
-                    let too_low = height < -self.settings.free_max_height_m.max(noise);
-                    // What stands upright is an obstacle as soon as it does not pass for ground.
-                    let stands = too_high && (role == Role::Obstacle || role == Role::Ground && height >= min_height);
-                    if stands && height <= clearance {
-                        evidence.obstacle = evidence.obstacle.saturating_add(1);
-                        evidence.height_dm = evidence.height_dm.max((height * 10.0) as u8);
-                    } else if too_low || too_high && height <= clearance {
-                        evidence.unclear = evidence.unclear.saturating_add(1);
-                    } else if role == Role::Ground && !too_high {
-                        evidence.ground = evidence.ground.saturating_add(1);
-                    }
-                }
-            }
-            for i in 0..3 {
-                direction[i] += step[i];
-            }
-            climb += climb_step;
-        }
-    }
-
-    /// How far the height of a pixel of a surface may be off, metres for each square metre of its range squared: the error of its
-    /// distance, times how fast its ray drops towards the ground there. A slope that rises towards the robot is seen at a larger
-    /// angle, and its heights are less certain.
-    fn height_noise_per_m2<const DISPARITIES: usize>(
-        &self,
-        surface: &Surface,
-        view: &View<'_, DISPARITIES>,
-        ground: &Terrain,
-        direction: [f32; 3],
-    ) -> f32 {
-        let [x, y, _] = surface.points.mean_m;
-        let half = 0.5 * SLOPE_STEP_M;
-        let slope_ahead = (ground.lift_m(x + half, y) - ground.lift_m(x - half, y)) / SLOPE_STEP_M;
-        let slope_aside = (ground.lift_m(x, y + half) - ground.lift_m(x, y - half)) / SLOPE_STEP_M;
-        let [nx, ny, nz] = ground.plane().normal;
-        let drop = direction[0] * (nx - slope_ahead) + direction[1] * (ny - slope_aside) + direction[2] * nz;
-        self.settings.height_noise_px * drop.abs() / (view.pair.focal_px * view.pair.baseline_m)
     }
 
     /// What the votes make of a cell.

@@ -7,6 +7,7 @@ mod sectors;
 mod settings;
 mod shadow;
 mod smear;
+mod votes;
 
 pub(crate) use builder::{Evidence, Vote};
 pub use builder::{MapBuilder, View};

@@ -19,7 +19,7 @@ pub use settings::{MatchCost, MatchSettings, Prefilter};
 pub(crate) use strip::Strip;
 
 use crate::{
-    arch::{self, Backend, CHUNK, Decide, Found, KeyLimits, Search, Sums},
+    arch::{self, Backend, CHUNK, CostJob, Decide, Found, KeyJob, KeyLimits, Search, Sums},
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
 };
@@ -27,7 +27,7 @@ use best::RightBest;
 use columns::Columns;
 use plan::Plan;
 use rows::Rows;
-use steps::{CheckBack, DecidePixels, PushRow, SlideEvidence};
+use steps::{CheckBack, DecidePixels, PushRow, SlideEvidence, SumEvidence};
 
 /// The matcher for pictures up to `WIDTH` wide and up to `DISPARITIES` disparities.
 ///
@@ -112,7 +112,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         self.settings = *settings;
         let backend = if self.is_forced { self.backend } else { Backend::fastest() };
         self.plan = Plan::new::<WIDTH, DISPARITIES>(backend, settings, width);
-        self.key_limits.fill(settings.uniqueness_percent);
+        self.key_limits.fill(settings.narrow_uniqueness_percent());
         self.width = width;
         self.height = height;
         self.begin();
@@ -210,8 +210,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             Window::Wide => settings.wide_window_width,
         };
         let uniqueness_percent = match window {
-            Window::Narrow => settings.uniqueness_percent,
-            Window::Wide => settings.wide_uniqueness_percent,
+            Window::Narrow => settings.narrow_uniqueness_percent(),
+            Window::Wide => [settings.wide_uniqueness_percent; 2],
         };
         let radius = usize::from(width) / 2;
         let margin = radius + settings.reach();
@@ -227,7 +227,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             min_texture: (u32::from(settings.texture) * area) >> 4,
             weak_texture: (u32::from(settings.weak_texture) * area) >> 4,
             max_saturated: area * u32::from(settings.saturated_percent) / 100,
-            unique: uniqueness_percent > 0,
+            unique: uniqueness_percent.map(|percent| percent > 0),
             only_weak: window == Window::Wide,
             keys: window == Window::Narrow && self.plan.keys,
         };
@@ -257,18 +257,15 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             search.follows = search.range.end == run.start && !search.range.is_empty();
             search.range = run.start..run.end.min(run.start + CHUNK);
             run.start = search.range.end;
+            let (sums, found) = (&mut self.sums, &mut self.found);
+            let evidence = self.columns.evidence();
+            let weak_texture = decide.weak_texture;
+            arch::compiled(self.plan.chosen, SumEvidence { search: &search, evidence, weak_texture, sums, found });
             self.search(&search, window);
             let chunk = search.range.clone();
             let (Some(out), Some(weak)) = (out.get_mut(chunk.clone()), self.weak.get_mut(chunk)) else { break };
-            let steps = DecidePixels {
-                decide: &decide,
-                search: &search,
-                found: &self.found,
-                evidence: self.columns.evidence(),
-                sums: &mut self.sums,
-                out,
-                weak,
-            };
+            let steps =
+                DecidePixels { decide: &decide, search: &search, found: &self.found, sums: &self.sums, out, weak };
             arch::compiled(self.plan.chosen, steps);
         }
         if settings.back_check && window == Window::Narrow {
@@ -304,14 +301,16 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         let lent = right.lend(plan.lead);
         match (self.settings.cost, window) {
             (MatchCost::Census, Window::Narrow) if plan.keys => {
-                arch::search_keys(plan.chosen, search, &self.key_limits, columns.bytes(), work, lent, found);
+                let (limits, columns) = (&self.key_limits, columns.bytes());
+                arch::search_keys(plan.chosen, KeyJob { search, limits, columns, work, right: lent, found });
             }
             (MatchCost::Census, _) => {
-                let right = (window == Window::Narrow).then_some(lent);
-                arch::search_bytes(plan.chosen, search, columns.bytes(), work, right, found);
+                let (columns, right) = (columns.bytes(), (window == Window::Narrow).then_some(lent));
+                arch::search_bytes(plan.chosen, CostJob { search, columns, work, right, found });
             }
             (MatchCost::AbsoluteDifferences, _) => {
-                arch::search_words(search, columns.words(), work, (window == Window::Narrow).then_some(lent), found);
+                let (columns, right) = (columns.words(), (window == Window::Narrow).then_some(lent));
+                arch::search_words(CostJob { search, columns, work, right, found });
             }
         }
     }

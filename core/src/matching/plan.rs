@@ -34,14 +34,18 @@ impl Plan {
         let back = min_disparity + disparities - 1;
         // Keys count places from 0 at the largest disparity; turned, from 127 down.
         let key_disparity = (back as u16).wrapping_sub(127);
+        // That of the signal processing instructions counts them so that it ends at 127.
+        let key_disparity_dsp = settings.min_disparity;
         let mut backend = if settings.cost == MatchCost::Census { backend } else { Backend::Plain };
         while backend != Backend::Plain {
             let stride = disparities.next_multiple_of(backend.lanes());
-            let room = width * stride <= WIDTH * DISPARITIES * 2
+            let room = backend.takes(disparities)
+                && width * stride <= WIDTH * DISPARITIES * 2
                 && back <= LEAD_ROWS * WIDTH
                 && width + stride <= WIDTH + WIDTH / 2
                 && stride + 2 * PAD <= 4 * DISPARITIES;
             if let Some(chosen) = Chosen::new(backend).filter(|_| room) {
+                let key_disparity = if backend == Backend::Dsp { key_disparity_dsp } else { key_disparity };
                 return Self { chosen, stride, keys, lead: back, key_disparity };
             }
             backend = backend.slower();

@@ -57,6 +57,9 @@ pub struct MatchSettings {
     /// A match must be better by this many percent than any other that is more than one pixel away; 0 turns the
     /// uniqueness check off. Mild, as texture.
     pub uniqueness_percent: u16,
+    /// As `uniqueness_percent`, for the first window where the texture is weak and there is a second one: what the first is not
+    /// sure of, the second tells better.
+    pub weak_uniqueness_percent: u16,
     /// Whether a pixel loses its match if its partner in the right picture matches another one better.
     pub back_check: bool,
     /// Largest difference between the match from left to right and the one back, px.
@@ -85,6 +88,7 @@ impl MatchSettings {
         prefilter: Prefilter::HorizontalSobel,
         texture: 32,
         uniqueness_percent: 6,
+        weak_uniqueness_percent: 12,
         back_check: true,
         back_check_px: 1,
         saturated_percent: 60,
@@ -102,6 +106,7 @@ impl MatchSettings {
         prefilter: Prefilter::HorizontalSobel,
         texture: 0,
         uniqueness_percent: 0,
+        weak_uniqueness_percent: 0,
         back_check: false,
         back_check_px: 0,
         saturated_percent: 0,
@@ -113,6 +118,12 @@ impl MatchSettings {
     pub const MAX_WINDOW: u16 = 21;
     /// Largest width of the second window.
     pub const MAX_WIDE_WINDOW: u16 = 63;
+
+    /// Uniqueness that the first window is asked for: where there is texture, and where it is weak.
+    pub(super) const fn narrow_uniqueness_percent(&self) -> [u16; 2] {
+        let weak = if self.wide_window_width > 0 { self.weak_uniqueness_percent } else { self.uniqueness_percent };
+        [self.uniqueness_percent, weak]
+    }
 
     /// Rows above and below a pixel that what is compared of it depends on.
     pub(crate) const fn reach(&self) -> usize {
@@ -168,6 +179,7 @@ impl MatchSettings {
         range("matching.wide_uniqueness_percent", self.wide_uniqueness_percent, 0, 100)?;
         range("matching.texture", self.texture, 0, 1000)?;
         range("matching.uniqueness_percent", self.uniqueness_percent, 0, 100)?;
+        range("matching.weak_uniqueness_percent", self.weak_uniqueness_percent, 0, 100)?;
         range("matching.back_check_px", self.back_check_px, 0, 64)?;
         range("matching.saturated_percent", self.saturated_percent, 1, 100)
     }

@@ -23,6 +23,7 @@ fn settings_that_cannot_be_are_named() {
         assert_eq!(problem(high), ConfigError::new("matching.window_height", ConfigProblem::NotOdd));
     }
     assert_eq!(field(MatchSettings { weak_texture: 1001, ..good }), "matching.weak_texture");
+    assert_eq!(field(MatchSettings { weak_uniqueness_percent: 101, ..good }), "matching.weak_uniqueness_percent");
     assert_eq!(field(MatchSettings { wide_uniqueness_percent: 101, ..good }), "matching.wide_uniqueness_percent");
     assert_eq!(field(MatchSettings { texture: 1001, ..good }), "matching.texture");
     assert_eq!(field(MatchSettings { uniqueness_percent: 101, ..good }), "matching.uniqueness_percent");

@@ -39,14 +39,30 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Steps for SlideEvidence<'_, W
     }
 }
 
+/// Sums the evidence under the windows of a chunk, and says where the texture is weak.
+pub(super) struct SumEvidence<'a> {
+    pub(super) search: &'a Search,
+    /// Sums of evidence of all columns.
+    pub(super) evidence: &'a [u32],
+    pub(super) weak_texture: u32,
+    pub(super) sums: &'a mut Sums,
+    pub(super) found: &'a mut Found,
+}
+
+impl Steps for SumEvidence<'_> {
+    #[inline(always)]
+    fn run(self) {
+        self.sums.make(self.search, self.evidence);
+        self.sums.weak(self.weak_texture, &mut self.found.weak);
+    }
+}
+
 /// Decides on the pixels of a chunk.
 pub(super) struct DecidePixels<'a> {
     pub(super) decide: &'a Decide,
     pub(super) search: &'a Search,
     pub(super) found: &'a Found,
-    /// Sums of evidence of all columns.
-    pub(super) evidence: &'a [u32],
-    pub(super) sums: &'a mut Sums,
+    pub(super) sums: &'a Sums,
     pub(super) out: &'a mut [DisparityPixel],
     pub(super) weak: &'a mut [bool],
 }
@@ -54,7 +70,6 @@ pub(super) struct DecidePixels<'a> {
 impl Steps for DecidePixels<'_> {
     #[inline(always)]
     fn run(self) {
-        self.sums.make(self.search, self.evidence);
         self.decide.run(self.search, self.found, self.sums, self.out, self.weak);
     }
 }

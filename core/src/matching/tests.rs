@@ -28,7 +28,8 @@ struct Plain<'a> {
 /// One of the two windows: half its width and height, what it asks for, and the costs of the whole picture under it.
 struct PlainWindow {
     half: [i32; 2],
-    uniqueness_percent: i32,
+    /// Where there is texture, and where it is weak.
+    uniqueness_percent: [i32; 2],
     checks_back: bool,
     /// By row, column and disparity; `None` where a window does not lie within what is valid.
     costs: Vec<Vec<Vec<Option<i32>>>>,
@@ -110,9 +111,9 @@ impl<'a> Plain<'a> {
         [within(|row| row.0), within(|row| row.1)]
     }
 
-    fn window(&self, width: u16, uniqueness_percent: u16, checks_back: bool) -> PlainWindow {
+    fn window(&self, width: u16, uniqueness_percent: [u16; 2], checks_back: bool) -> PlainWindow {
         let half = [width, self.settings.window_height].map(|edge| i32::from(edge / 2));
-        let uniqueness_percent = i32::from(uniqueness_percent);
+        let uniqueness_percent = uniqueness_percent.map(i32::from);
         let mut window = PlainWindow { half, uniqueness_percent, checks_back, costs: Vec::new() };
         let [width, height] = self.size();
         // Differences of single pixels, so that each is worked out once.
@@ -174,7 +175,7 @@ impl<'a> Plain<'a> {
             return Some(DisparityPixel::none(Reason::OutOfRange));
         }
         let second = candidates.iter().filter(|&&(other, _)| (other - d).abs() > 1).map(|&(_, cost)| cost).min();
-        let percent = window.uniqueness_percent;
+        let percent = window.uniqueness_percent[usize::from(self.is_weak(window, (x, y)))];
         if percent > 0 && second.is_some_and(|second| second * 100 <= best * (100 + percent)) {
             return Some(DisparityPixel::none(Reason::NotUnique));
         }
@@ -187,6 +188,10 @@ impl<'a> Plain<'a> {
             return Some(DisparityPixel::none(Reason::LeftRightMismatch));
         }
         Some(pixel)
+    }
+
+    fn is_weak(&self, window: &PlainWindow, at: (i32, i32)) -> bool {
+        self.texture(window, at) < i32::from(self.settings.weak_texture) * window.area() / 16
     }
 
     /// Whether the right partner of a pixel matches this pixel, with the same window.
@@ -202,10 +207,12 @@ impl<'a> Plain<'a> {
     /// Every pixel of the picture, and what both windows said where both were asked.
     fn picture(&self, seen: &mut Seen) -> Vec<DisparityPixel> {
         let s = &self.settings;
-        let narrow = self.window(s.window_width, s.uniqueness_percent, true);
+        // Where the texture is weak and there is a second window, the first has a limit of its own.
+        let weak = if s.wide_window_width > 0 { s.weak_uniqueness_percent } else { s.uniqueness_percent };
+        let narrow = self.window(s.window_width, [s.uniqueness_percent, weak], true);
         // The wide window is not checked back.
         let wide =
-            (s.wide_window_width > 0).then(|| self.window(s.wide_window_width, s.wide_uniqueness_percent, false));
+            (s.wide_window_width > 0).then(|| self.window(s.wide_window_width, [s.wide_uniqueness_percent; 2], false));
         let [width, height] = self.size();
         let mut picture = Vec::new();
         for at in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
@@ -214,9 +221,9 @@ impl<'a> Plain<'a> {
                 continue;
             };
             *seen.entry((s.cost.is_census(), Asked::Narrow, first.get().err())).or_default() += 1;
-            let weak = || self.texture(&narrow, at) < i32::from(s.weak_texture) * narrow.area() / 16;
             let undecided = matches!(first.get(), Err(Reason::LowTexture | Reason::NotUnique));
-            let second = wide.as_ref().filter(|_| undecided && weak()).and_then(|wide| self.ask(wide, at));
+            let second =
+                wide.as_ref().filter(|_| undecided && self.is_weak(&narrow, at)).and_then(|wide| self.ask(wide, at));
             if let Some(second) = second {
                 *seen.entry((s.cost.is_census(), Asked::Wide, second.get().err())).or_default() += 1;
             }
@@ -299,6 +306,7 @@ fn settings(random: &mut Random, round: u32) -> MatchSettings {
         prefilter,
         texture: random.below(60) as u16,
         uniqueness_percent: random.below(20) as u16,
+        weak_uniqueness_percent: random.below(30) as u16,
         back_check: random.below(4) > 0,
         back_check_px: random.below(3) as u16,
         saturated_percent: 1 + random.below(100) as u16,

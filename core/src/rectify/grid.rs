@@ -4,6 +4,8 @@
 //! Between the nodes the map is bilinear, also exact in integers, and linear along a row from node to node: a start and
 //! a slope tell eight pixels.
 
+use core::{iter::Zip, slice::Iter};
+
 use super::cameras::CameraMap;
 
 /// Pixels from node to node, a power of two.
@@ -76,38 +78,64 @@ impl<const NODES: usize> Grid<NODES> {
     }
 
     /// The segments of row `v` from the left, `None` where the map has no value; none at all below the picture.
-    pub(super) fn segments(&self, v: usize) -> impl Iterator<Item = Option<Segment>> + '_ {
+    #[inline(always)]
+    pub(super) fn segments(&self, v: usize) -> Segments<'_> {
         let first = (v >> STEP_SHIFT).saturating_mul(self.columns);
         let upper = self.nodes.get(first..).unwrap_or(&[]);
         let lower = upper.get(self.columns..).unwrap_or(&[]);
-        let below = (v % STEP) as i32;
-        let node = move |(upper, lower): (&[i16; 2], &[i16; 2])| {
-            if *upper == NOWHERE || *lower == NOWHERE {
-                return None;
-            }
-            let between = |i: usize| i32::from(upper[i]) * (STEP as i32 - below) + i32::from(lower[i]) * below;
-            Some([between(0), between(1)])
-        };
-        let mut nodes = upper.iter().zip(lower).take(self.columns).map(node);
-        let mut left = nodes.next().flatten();
+        let lower = lower.get(..self.columns).unwrap_or(lower);
+        let nodes = upper.iter().zip(lower);
         let plane = self.plane;
-        let mut base: [i32; 2] =
-            core::array::from_fn(|i| plane.origin[i].wrapping_add(plane.along_column[i].wrapping_mul(v as i32)));
-        nodes.map(move |right| {
-            let segment = match (left, right) {
-                (Some(left), Some(right)) => {
-                    let start = |i: usize| base[i].wrapping_add(left[i] << STEP_SHIFT);
-                    let slope = |i: usize| plane.along_row[i].wrapping_add(right[i] - left[i]);
-                    Some(Segment { start: [start(0), start(1)], slope: [slope(0), slope(1)] })
-                }
-                _ => None,
-            };
-            for (base, along) in base.iter_mut().zip(plane.along_row) {
-                *base = base.wrapping_add(along << STEP_SHIFT);
+        let base = core::array::from_fn(|i| plane.origin[i].wrapping_add(plane.along_column[i].wrapping_mul(v as i32)));
+        let mut segments = Segments { nodes, along_row: plane.along_row, base, left: None, below: (v % STEP) as i32 };
+        segments.left = segments.node().flatten();
+        segments
+    }
+}
+
+/// The segments of a row.
+pub(super) struct Segments<'a> {
+    nodes: Zip<Iter<'a, [i16; 2]>, Iter<'a, [i16; 2]>>,
+    along_row: [i32; 2],
+    /// Where the plane has the node to the left.
+    base: [i32; 2],
+    left: Option<[i32; 2]>,
+    /// Rows below the upper nodes.
+    below: i32,
+}
+
+impl Segments<'_> {
+    /// The value of the map between the next two nodes, in `1 / 2^(NODE_SHIFT + STEP_SHIFT)` px.
+    #[inline(always)]
+    fn node(&mut self) -> Option<Option<[i32; 2]>> {
+        let (upper, lower) = self.nodes.next()?;
+        let below = self.below;
+        let between = |i: usize| i32::from(upper[i]) * (STEP as i32 - below) + i32::from(lower[i]) * below;
+        // Nodes hold either both of their numbers or none.
+        let known = upper[0] != NOWHERE[0] && lower[0] != NOWHERE[0];
+        Some(known.then(|| [between(0), between(1)]))
+    }
+}
+
+impl Iterator for Segments<'_> {
+    type Item = Option<Segment>;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        let right = self.node()?;
+        let segment = match (self.left, right) {
+            (Some(left), Some(right)) => {
+                let start = |i: usize| self.base[i].wrapping_add(left[i] << STEP_SHIFT);
+                let slope = |i: usize| self.along_row[i].wrapping_add(right[i] - left[i]);
+                Some(Segment { start: [start(0), start(1)], slope: [slope(0), slope(1)] })
             }
-            left = right;
-            segment
-        })
+            _ => None,
+        };
+        for (base, along) in self.base.iter_mut().zip(self.along_row) {
+            *base = base.wrapping_add(along << STEP_SHIFT);
+        }
+        self.left = right;
+        Some(segment)
     }
 }
 

@@ -12,6 +12,7 @@ mod sample;
 use core::ops::Range;
 
 use crate::{
+    arch::{self, Chosen},
     error::{ConfigError, ConfigProblem},
     geometry::{RectifiedPair, StereoCalibration},
     picture::Picture,
@@ -19,7 +20,7 @@ use crate::{
 
 use cameras::CameraMap;
 use grid::{Grid, side_nodes};
-use sample::{Source, sample_row};
+use sample::{SampleRow, Source};
 
 /// One of the two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +47,7 @@ pub struct Rectifier<const GRID: usize> {
     remaps: bool,
     left: Camera<GRID>,
     right: Camera<GRID>,
+    chosen: Chosen,
 }
 
 #[derive(Clone, Debug)]
@@ -66,7 +68,7 @@ impl<const GRID: usize> Rectifier<GRID> {
             baseline_m: 0.0,
             disparity_offset_px: 0.0,
         };
-        Self { pair, remaps: false, left: Camera::new(), right: Camera::new() }
+        Self { pair, remaps: false, left: Camera::new(), right: Camera::new(), chosen: Chosen::PLAIN }
     }
 
     /// Takes a calibration and returns the rectified pair that the rows belong to.
@@ -102,6 +104,11 @@ impl<const GRID: usize> Rectifier<GRID> {
             }
         }
         Ok(self.pair)
+    }
+
+    /// Has rows made with the instructions of a backend.
+    pub(crate) const fn choose(&mut self, chosen: Chosen) {
+        self.chosen = chosen;
     }
 
     /// The rectified pair; of width and height 0 before the first calibration.
@@ -141,7 +148,9 @@ impl<const GRID: usize> Rectifier<GRID> {
         if self.remaps {
             let camera = self.camera(side);
             let source = Source::new(raw, camera.map.raw_size());
-            return sample_row(camera.grid.segments(y), &source, row);
+            let mut longest = 0..0;
+            arch::compiled(self.chosen, SampleRow { grid: &camera.grid, source, y, out: row, longest: &mut longest });
+            return longest;
         }
         let given = if y < raw.height() { raw.row(y) } else { &[] };
         let (copied, beyond) = row.split_at_mut(row.len().min(given.len()));

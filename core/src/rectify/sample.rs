@@ -2,9 +2,9 @@
 
 use core::ops::Range;
 
-use crate::picture::Picture;
+use crate::{arch::Steps, picture::Picture};
 
-use super::grid::{PLACE_SHIFT, STEP, Segment};
+use super::grid::{Grid, PLACE_SHIFT, STEP, Segment};
 
 /// Fraction bits of the bilinear weights: 1/64 px, which moves an edge by less than the map's own error, and small enough
 /// that sums fit 16 bits.
@@ -14,6 +14,9 @@ const WEIGHT_ONE: u16 = 1 << WEIGHT_SHIFT;
 /// Bits dropped between both directions, so that the second still fits 16 bits: quarters of a grey level remain.
 const DROPPED: u32 = 4;
 
+/// Bits dropped at last.
+const LAST: u32 = 2 * WEIGHT_SHIFT - DROPPED;
+
 /// Columns and rows that the pixels of one segment are read from, at most.
 const TILE_COLUMNS: usize = 16;
 const TILE_ROWS: usize = 4;
@@ -21,56 +24,59 @@ const TILE_ROWS: usize = 4;
 /// Added to a place, so that cutting it to the weight's bits rounds it.
 pub(super) const HALF_WEIGHT: i32 = 1 << (PLACE_SHIFT - WEIGHT_SHIFT - 1);
 
-/// Fills a row and returns its longest run of pixels whose source lies in the picture; the others are 0.
-pub(super) fn sample_row(
-    segments: impl Iterator<Item = Option<Segment>>,
-    source: &Source<'_>,
-    out: &mut [u8],
-) -> Range<usize> {
-    let width = out.len();
-    let mut runs = Runs::default();
-    let mut chunks = out.chunks_mut(STEP);
-    let mut begin = 0;
-    for (segment, chunk) in segments.zip(chunks.by_ref()) {
-        let Some(segment) = segment else {
-            chunk.fill(0);
-            runs.end_at(begin);
+/// Fills a row and finds its longest run of pixels whose source lies in the picture; the others are 0.
+pub(super) struct SampleRow<'a, const NODES: usize> {
+    pub(super) grid: &'a Grid<NODES>,
+    pub(super) source: Source<'a>,
+    /// The row of the rectified picture.
+    pub(super) y: usize,
+    pub(super) out: &'a mut [u8],
+    pub(super) longest: &'a mut Range<usize>,
+}
+
+impl<const NODES: usize> Steps for SampleRow<'_, NODES> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { grid, source, y, out, longest } = self;
+        let width = out.len();
+        let mut runs = Runs::default();
+        let mut segments = grid.segments(y);
+        let (chunks, rest) = out.as_chunks_mut::<STEP>();
+        let mut begin = 0;
+        for chunk in chunks {
+            // None beyond the last: the row is longer than the rectified picture.
+            let segment = segments.next().flatten();
+            let Some(segment) = segment else {
+                chunk.fill(0);
+                runs.end_at(begin);
+                begin += STEP;
+                runs.start = begin;
+                continue;
+            };
+            let place = step(segment.start, [HALF_WEIGHT; 2]);
+            let whole = source.fill_plain(place, segment.slope, chunk);
+            if !whole && !source.fill_inside(place, segment.slope, chunk) {
+                source.fill_each(segment, begin, chunk, &mut runs);
+            }
             begin += STEP;
-            runs.start = begin;
-            continue;
-        };
-        let mut place = step(segment.start, [HALF_WEIGHT; 2]);
-        let whole = match <&mut [u8; STEP]>::try_from(&mut *chunk) {
-            Ok(chunk) => source.fill_inside(place, segment.slope, chunk),
-            Err(_) => false,
-        };
-        if !whole {
-            for (index, pixel) in chunk.iter_mut().enumerate() {
-                if let Some(value) = source.at(place) {
-                    *pixel = value;
-                } else {
-                    *pixel = 0;
-                    runs.end_at(begin + index);
-                    runs.start = begin + index + 1;
-                }
-                place = step(place, segment.slope);
+        }
+        match segments.next().flatten() {
+            Some(segment) => source.fill_each(segment, begin, rest, &mut runs),
+            None => {
+                rest.fill(0);
+                runs.end_at(begin);
+                runs.start = width;
             }
         }
-        begin += STEP;
+        runs.end_at(width);
+        *longest = runs.longest;
+        if let Some(before) = out.get_mut(..longest.start) {
+            before.fill(0);
+        }
+        if let Some(after) = out.get_mut(longest.end..) {
+            after.fill(0);
+        }
     }
-    // Fewer segments than pixels: the row is longer than the rectified picture.
-    for chunk in chunks {
-        chunk.fill(0);
-    }
-    runs.end_at(begin.min(width));
-    let longest = runs.longest;
-    if let Some(before) = out.get_mut(..longest.start) {
-        before.fill(0);
-    }
-    if let Some(after) = out.get_mut(longest.end..) {
-        after.fill(0);
-    }
-    longest
 }
 
 fn step(place: [i32; 2], slope: [i32; 2]) -> [i32; 2] {
@@ -106,6 +112,76 @@ impl<'a> Source<'a> {
         let (width, height) = (picture.width().min(size.0), picture.height().min(size.1));
         let last = [width, height].map(|n| n.clamp(1, 1 << 15) as i32 - 1);
         Self { data: picture.data(), stride: picture.stride(), last }
+    }
+
+    /// Fills a segment pixel by pixel; `begin` is the column of the first.
+    fn fill_each(&self, segment: Segment, begin: usize, out: &mut [u8], runs: &mut Runs) {
+        let mut place = step(segment.start, [HALF_WEIGHT; 2]);
+        for (index, pixel) in out.iter_mut().enumerate() {
+            if let Some(value) = self.at(place) {
+                *pixel = value;
+            } else {
+                *pixel = 0;
+                runs.end_at(begin + index);
+                runs.start = begin + index + 1;
+            }
+            place = step(place, segment.slope);
+        }
+    }
+
+    /// Fills a whole segment where the lens hardly moves it: no more than one column is left out or read twice on the way, and one
+    /// row crossed. Otherwise leaves it to [`Self::fill_inside`]. Gives the same bits.
+    ///
+    /// Each pixel then lies among three columns and three rows that follow from its number alone, so that nothing has to be looked up:
+    /// bilinear weights fall to zero one column and one row away, and what is zero may be added.
+    #[inline(always)]
+    fn fill_plain(&self, start: [i32; 2], slope: [i32; 2], out: &mut [u8; STEP]) -> bool {
+        const ONE: i32 = 1 << PLACE_SHIFT;
+        // So far pixels may drift, from one to the next, against the same picture merely moved.
+        const MOST: i32 = ONE / STEP as i32;
+        let drift = [slope[0].wrapping_sub(ONE), slope[1]];
+        if drift.iter().any(|&drift| drift.unsigned_abs() > MOST as u32) {
+            return false;
+        }
+        let last = STEP as i32 - 1;
+        let low: [i32; 2] = [0, 1].map(|i| start[i].min(start[i].wrapping_add(drift[i] * last)));
+        let right = start[0].wrapping_add(slope[0] * last);
+        let [column, top] = low.map(|low| low >> PLACE_SHIFT);
+        // Three rows are read, and of each row more than is used: at the lower edge that is left to others.
+        if low[0] < 0 || low[1] < 0 || right >= self.last[0] << PLACE_SHIFT || top + 2 > self.last[1] {
+            return false;
+        }
+        let bytes = self.data.get(top as usize * self.stride + column as usize..).unwrap_or_default();
+        let row = |down: usize| bytes.get(down * self.stride..).and_then(|rest| rest.first_chunk::<TILE_COLUMNS>());
+        let (Some(first), Some(second), Some(third)) = (row(0), row(1), row(2)) else { return false };
+        let rows = [first, second, third];
+        // Weights of the three columns and rows of each pixel, from where it lies within two.
+        let mut weights = [[[0u16; STEP]; 3]; 2];
+        for i in 0..2 {
+            let from = (start[i] - (low[i] >> PLACE_SHIFT << PLACE_SHIFT)) as u16;
+            let [first, second, third] = &mut weights[i];
+            for k in 0..STEP {
+                let place = from.wrapping_add((drift[i] as u16).wrapping_mul(k as u16));
+                let along = place >> (PLACE_SHIFT - WEIGHT_SHIFT);
+                first[k] = WEIGHT_ONE.saturating_sub(along);
+                third[k] = along.saturating_sub(WEIGHT_ONE);
+                second[k] = WEIGHT_ONE - first[k] - third[k];
+            }
+        }
+        let [across, down] = &weights;
+        let mut sums = [0u16; STEP];
+        for (column, across) in across.iter().enumerate() {
+            for k in 0..STEP {
+                let grey = |row: usize| u16::from(rows[row][column + k]).wrapping_mul(down[row][k]);
+                let sum = grey(0).wrapping_add(grey(1)).wrapping_add(grey(2));
+                let dropped = sum.wrapping_add(1 << (DROPPED - 1)) >> DROPPED;
+                sums[k] = sums[k].wrapping_add(dropped.wrapping_mul(across[k]));
+            }
+        }
+        for k in 0..STEP {
+            out[k] = (sums[k].wrapping_add(1 << (LAST - 1)) >> LAST) as u8;
+        }
+        true
     }
 
     /// Fills a whole segment, if all of its pixels have four neighbours in the picture and lie in a tile; otherwise leaves
@@ -200,6 +276,5 @@ fn blend(upper: [u16; 2], lower: [u16; 2], across: u16, down: u16) -> u8 {
     };
     let (left, right) = (column(upper[0], lower[0]), column(upper[1], lower[1]));
     let sum = left.wrapping_mul(WEIGHT_ONE - across).wrapping_add(right.wrapping_mul(across));
-    const LAST: u32 = 2 * WEIGHT_SHIFT - DROPPED;
     (sum.wrapping_add(1 << (LAST - 1)) >> LAST) as u8
 }

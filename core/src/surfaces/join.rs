@@ -35,28 +35,57 @@ impl<const SURFACES: usize> Regions<SURFACES> {
             *parent = place as u16;
         }
         let (width, height) = (picture.width(), picture.height());
-        let step = surfaces.settings().step_sixteenths;
         let table = surfaces.table();
-        let mut touch = |(ax, ay): (usize, usize), (bx, by): (usize, usize)| {
-            let (Some(a), Some(b)) = (surfaces.place_at(ax, ay), surfaces.place_at(bx, by)) else { return };
-            let steps = |x: usize, y: usize| picture.row(y).get(x).map_or(0, |pixel| pixel.steps());
-            let contiguous = steps(ax, ay).abs_diff(steps(bx, by)) <= step;
-            let both = |a: usize, b: usize| Some(takes_part(table.get(a)?) && takes_part(table.get(b)?));
-            if contiguous && both(a, b).unwrap_or(false) {
-                self.unite(a, b);
-            }
-        };
-        for y in (TILE..height).step_by(TILE) {
-            for x in 0..width {
-                touch((x, y.saturating_sub(1)), (x, y));
-            }
-        }
-        for x in (TILE..width).step_by(TILE) {
-            for y in 0..height {
-                touch((x.saturating_sub(1), y), (x, y));
+        // The surfaces of another picture have nothing to do with this one.
+        if (width, height) == surfaces.size() {
+            for y0 in (0..height).step_by(TILE) {
+                for x0 in (0..width).step_by(TILE) {
+                    let here = surfaces.first_of_tile(x0, y0);
+                    if let Some(above) = y0.checked_sub(1) {
+                        let first = y0 * width + x0;
+                        let border = Border { first, step: 1, length: TILE.min(width - x0), across: width };
+                        self.cross(surfaces, picture, &border, (surfaces.first_of_tile(x0, above), here), &takes_part);
+                    }
+                    if let Some(left) = x0.checked_sub(1) {
+                        let first = y0 * width + x0;
+                        let border = Border { first, step: width, length: TILE.min(height - y0), across: 1 };
+                        self.cross(surfaces, picture, &border, (surfaces.first_of_tile(left, y0), here), &takes_part);
+                    }
+                }
             }
         }
         self.chain(table.len());
+    }
+
+    /// Joins surfaces across a border of a tile: those before it, whose first in the table is `firsts.0`, with those behind.
+    fn cross<const PIXELS: usize>(
+        &mut self,
+        surfaces: &Surfaces<PIXELS, SURFACES>,
+        picture: DisparityPicture<'_>,
+        border: &Border,
+        firsts: (usize, usize),
+        takes_part: &impl Fn(&Surface) -> bool,
+    ) {
+        let (labels, pixels, table) = (surfaces.labels(), picture.pixels(), surfaces.table());
+        let reach = surfaces.settings().step_sixteenths;
+        // Neighbours along the border mostly belong to the same two surfaces, which are joined but once.
+        let mut last = (0, 0);
+        for behind in (border.first..).step_by(border.step).take(border.length) {
+            let before = behind.saturating_sub(border.across);
+            let (Some(&a), Some(&b)) = (labels.get(before), labels.get(behind)) else { return };
+            if a == 0 || b == 0 || (a, b) == last {
+                continue;
+            }
+            let (Some(from), Some(to)) = (pixels.get(before), pixels.get(behind)) else { return };
+            if from.steps().abs_diff(to.steps()) > reach {
+                continue;
+            }
+            last = (a, b);
+            let (a, b) = (firsts.0 + usize::from(a) - 1, firsts.1 + usize::from(b) - 1);
+            if [a, b].into_iter().all(|place| table.get(place).is_some_and(takes_part)) {
+                self.unite(a, b);
+            }
+        }
     }
 
     /// The regions, each by the surface that stands for it. Surfaces that took no part are regions of their own.
@@ -122,6 +151,16 @@ impl<const SURFACES: usize> Regions<SURFACES> {
             *parent = a.min(b) as u16;
         }
     }
+}
+
+/// Pixels along the border of a tile, as places in the picture.
+struct Border {
+    /// The first behind the border, and from each to the next.
+    first: usize,
+    step: usize,
+    length: usize,
+    /// From each to that before the border.
+    across: usize,
 }
 
 impl<const SURFACES: usize> Default for Regions<SURFACES> {

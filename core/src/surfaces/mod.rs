@@ -13,15 +13,16 @@ use core::ops::Range;
 use heapless::Vec;
 
 use crate::{
+    arch::{self, Chosen, Steps},
     disparity::{DisparityPicture, DisparityPixel},
     error::{ConfigError, ConfigProblem},
     geometry::{DepthTable, Rays},
-    links::same,
+    links::{changes, piece},
     planes::Scatter,
 };
 use moments::{Moments, RowMoments};
-pub(crate) use tile::CODES;
 use tile::{CODE_SHIFT, MAX_SURFACES, NUMBER_MASK, Tile, TileUnion};
+pub(crate) use tile::{CODES, MAX_SURFACES as MAX_TILE_SURFACES};
 
 /// Edge of a tile, px. The paper, section 4.4.
 pub const TILE: usize = 32;
@@ -106,6 +107,7 @@ pub struct Surfaces<const PIXELS: usize, const SURFACES: usize> {
     /// Place of each tile's first surface in the table.
     tiles: Vec<u16, SURFACES, u16>,
     table: Vec<Surface, SURFACES, u16>,
+    chosen: Chosen,
 }
 
 impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
@@ -124,6 +126,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             shifts: [0; MAX_SURFACES],
             tiles: Vec::new(),
             table: Vec::new(),
+            chosen: Chosen::PLAIN,
         }
     }
 
@@ -147,6 +150,11 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         self.tiles.clear();
         self.table.clear();
         Ok(())
+    }
+
+    /// Has surfaces found with the instructions of a backend.
+    pub(crate) const fn choose(&mut self, chosen: Chosen) {
+        self.chosen = chosen;
     }
 
     /// Finds the surfaces of `picture`, which must have the configured size, and fits a plane to each.
@@ -191,6 +199,23 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         if (picture.width(), picture.height()) != (self.width, self.height) {
             return SurfaceReport::default();
         }
+        let mut found = 0;
+        arch::compiled(
+            self.chosen,
+            Find::<_, _, _, CODED> { stage: self, picture, depth, rays, classes, found: &mut found },
+        );
+        SurfaceReport { found, dropped: found - self.table.len() as u32 }
+    }
+
+    /// Finds the surfaces and measures them; returns how many there are.
+    #[inline(always)]
+    fn go_through<const DISPARITIES: usize, const CODED: bool>(
+        &mut self,
+        picture: DisparityPicture<'_>,
+        depth: &DepthTable<DISPARITIES>,
+        rays: &Rays,
+        classes: &[SurfaceClass; CODES],
+    ) -> u32 {
         let pixels = picture.pixels();
         let (covered, mut found) = (depth.covered(), 0);
         for tile in Tile::all(self.width, self.height) {
@@ -208,7 +233,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             let given = if CODED { Some(self.take_classes(tile, classes)) } else { None };
             self.measure(pixels, tile, depth, rays, &mut keep, given.as_ref());
         }
-        SurfaceReport { found, dropped: found - self.table.len() as u32 }
+        found
     }
 
     /// The surfaces, tile by tile.
@@ -242,10 +267,23 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         &self.labels[y * self.width..(y + 1) * self.width]
     }
 
+    /// [`Self::labels_row`] of all rows, one after the other.
+    pub(crate) fn labels(&self) -> &[u8] {
+        &self.labels[..self.width * self.height]
+    }
+
     /// Place in the table of the first surface of the tile at `(x, y)`.
     pub(crate) fn first_of_tile(&self, x: usize, y: usize) -> usize {
         let tile = y / TILE * self.width.div_ceil(TILE) + x / TILE;
         self.tiles.get(tile).map_or(0, |&first| usize::from(first))
+    }
+
+    /// The surfaces of the tile at `(x, y)`, in the order of their numbers.
+    pub(crate) fn of_tile(&self, x: usize, y: usize) -> &[Surface] {
+        let tile = y / TILE * self.width.div_ceil(TILE) + x / TILE;
+        let Some(&first) = self.tiles.get(tile) else { return &[] };
+        let end = self.tiles.get(tile + 1).map_or(self.table.len(), |&end| usize::from(end));
+        self.table.get(usize::from(first)..end).unwrap_or_default()
     }
 
     /// Width and height of the pictures.
@@ -304,6 +342,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
     }
 
     /// Measures the surfaces of one tile and appends them to the table, with the classes `given` for them, if any.
+    #[inline(always)]
     fn measure<const DISPARITIES: usize>(
         &mut self,
         pixels: &[DisparityPixel],
@@ -335,14 +374,15 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         let middle = (TILE / 2) as i32;
         for y in 0..tile.height {
             let v = y as i32 - middle;
-            let pixels = pixels.get(row(y)).unwrap_or_default();
-            for (label, run) in segments(self.labels.get(row(y)).unwrap_or_default()) {
+            let labels = self.labels.get(row(y)).unwrap_or_default();
+            if labels.iter().all(|&label| label == 0) {
+                continue;
+            }
+            let distances = depth.inverses(&piece(pixels.get(row(y)).unwrap_or_default(), 0));
+            for (label, run) in segments(labels) {
                 let Some(i) = usize::from(label).checked_sub(1) else { continue };
                 if let (Some(moments), Some(&shift)) = (self.moments.get_mut(i), self.shifts.get(i)) {
-                    let end = run.end as i32 - middle;
-                    let distances = pixels.get(run).unwrap_or_default().iter();
-                    let distances = distances.map(|pixel| depth.inverse(pixel.bits()) >> (shift & 31));
-                    moments.add(&RowMoments::of(distances, end), v);
+                    moments.add(&RowMoments::of_run(&distances, run, u32::from(shift)), v);
                 }
             }
         }
@@ -394,16 +434,37 @@ impl<const PIXELS: usize, const SURFACES: usize> Default for Surfaces<PIXELS, SU
     }
 }
 
+/// All tiles of a picture.
+struct Find<'a, const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize, const CODED: bool> {
+    stage: &'a mut Surfaces<PIXELS, SURFACES>,
+    picture: DisparityPicture<'a>,
+    depth: &'a DepthTable<DISPARITIES>,
+    rays: &'a Rays,
+    classes: &'a [SurfaceClass; CODES],
+    found: &'a mut u32,
+}
+
+impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize, const CODED: bool> Steps
+    for Find<'_, PIXELS, SURFACES, DISPARITIES, CODED>
+{
+    #[inline(always)]
+    fn run(self) {
+        let Self { stage, picture, depth, rays, classes, found } = self;
+        *found = stage.go_through::<DISPARITIES, CODED>(picture, depth, rays, classes);
+    }
+}
+
 /// The pieces of a row of a tile that have one label each: label and columns.
+#[inline(always)]
 fn segments(labels: &[u8]) -> impl Iterator<Item = (u8, Range<usize>)> {
     // Beyond the end everything is without a label, and so is what lies before.
     let mut here = [0u8; TILE];
-    for (to, from) in here.iter_mut().zip(labels) {
-        *to = *from;
+    if let Some(whole) = labels.first_chunk() {
+        here = *whole;
+    } else {
+        here.iter_mut().zip(labels).for_each(|(to, from)| *to = *from);
     }
-    let mut before = [0u8; TILE];
-    before[1..].copy_from_slice(&here[..TILE - 1]);
-    let mut changes = !same(&here, &before);
+    let mut changes = changes(&here);
     let length = labels.len().min(TILE);
     core::iter::from_fn(move || {
         let first = changes.trailing_zeros() as usize;

@@ -1,5 +1,8 @@
 //! Exact sums over the points of one surface.
 
+use core::ops::Range;
+
+use super::TILE;
 use crate::{
     geometry::Rays,
     planes::{Scatter, SymmetricMatrix3},
@@ -25,7 +28,7 @@ pub(super) struct Moments {
 }
 
 /// Sums over pixels of one row.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct RowMoments {
     n: i64,
     z: i64,
@@ -35,12 +38,53 @@ pub(super) struct RowMoments {
     zzuu: i64,
 }
 
+/// From so many pixels on a run is summed up side by side with the rest of its row.
+const LONG_RUN: usize = 10;
+
 impl RowMoments {
+    /// Sums over a run of pixels of a row of a tile, whose distances are `z` without their lowest `shift` bits; of 16 bits then.
+    #[inline(always)]
+    pub(super) fn of_run(z: &[u32; TILE], run: Range<usize>, shift: u32) -> Self {
+        const MIDDLE: i64 = (TILE / 2) as i64;
+        let Range { start, end } = run;
+        if run.len() < LONG_RUN {
+            let z = z.get(run).unwrap_or_default().iter().map(|z| z >> (shift & 31));
+            return Self::of(z, end as i32 - MIDDLE as i32);
+        }
+        // The pixels of other runs add nothing. Columns are counted from the first of the tile, so that no number is negative.
+        let (mut z0, mut z1) = (0u32, 0u32);
+        let mut squares = [0u32; TILE];
+        for ((z, square), column) in z.iter().zip(&mut squares).zip(0u32..) {
+            let belongs = column.wrapping_sub(start as u32) < (end - start) as u32;
+            let z = if belongs { z >> (shift & 31) } else { 0 };
+            z0 = z0.wrapping_add(z);
+            z1 = z1.wrapping_add(z.wrapping_mul(column));
+            *square = z.wrapping_mul(z);
+        }
+        let (mut q0, mut q1, mut q2) = (0u64, 0u64, 0u64);
+        for (&square, column) in squares.iter().zip(0u32..) {
+            q0 = q0.wrapping_add(u64::from(square));
+            q1 = q1.wrapping_add(u64::from(square) * u64::from(column));
+            q2 = q2.wrapping_add(u64::from(square) * u64::from(column * column));
+        }
+        let (z0, z1) = (i64::from(z0), i64::from(z1));
+        let [q0, q1, q2] = [q0, q1, q2].map(|sum| sum as i64);
+        Self {
+            n: (end - start) as i64,
+            z: z0,
+            zu: z1 - MIDDLE * z0,
+            zz: q0,
+            zzu: q1 - MIDDLE * q0,
+            zzuu: q2 - 2 * MIDDLE * q1 + MIDDLE * MIDDLE * q0,
+        }
+    }
+
     /// Sums over neighbouring pixels with the distances `z`, at most a tile's row of them, each of 16 bits; `end` is the column after
     /// the last.
     ///
     /// Sums of sums need no product with the column: with `m` counted from the end, from 1, they are the sums of `z m` and of
     /// `z m (m + 1) / 2`, and a column is `end - m`.
+    #[inline(always)]
     pub(super) fn of(z: impl Iterator<Item = u32>, end: i32) -> Self {
         let (mut n, mut z0, mut z1) = (0u32, 0u32, 0u32);
         let (mut q0, mut q1, mut q2) = (0u64, 0u64, 0u64);
@@ -71,6 +115,7 @@ impl Moments {
     pub(super) const ZERO: Self = Self { n: 0, z: 0, zu: 0, zv: 0, zz: 0, zzu: 0, zzv: 0, zzuu: 0, zzuv: 0, zzvv: 0 };
 
     /// Adds a row.
+    #[inline(always)]
     pub(super) fn add(&mut self, row: &RowMoments, v: i32) {
         let v = i64::from(v);
         self.n += row.n;
@@ -137,6 +182,19 @@ mod tests {
 
     use super::*;
     use crate::test_random::Random;
+
+    #[test]
+    fn sums_of_a_run_are_those_of_its_pixels_alone() {
+        let mut random = Random::seeded("moments of runs", 0x5eed_0209);
+        for _ in 0..3000 {
+            let shift = random.below(12);
+            let z: [u32; TILE] = core::array::from_fn(|_| random.below(1 << (16 + shift)));
+            let start = random.below(TILE as u32) as usize;
+            let end = start + 1 + random.below((TILE - start) as u32) as usize;
+            let expected = RowMoments::of(z[start..end].iter().map(|z| z >> shift), end as i32 - 16);
+            assert_eq!(RowMoments::of_run(&z, start..end, shift), expected, "{start}..{end} >> {shift}: {z:?}");
+        }
+    }
 
     #[test]
     fn sums_of_sums_are_the_sums_of_products() {

@@ -5,7 +5,7 @@ use core::ops::Range;
 use super::{SurfaceSettings, TILE};
 use crate::{
     disparity::DisparityPixel,
-    links::{Links, PIECE, each_bit, near, piece, same},
+    links::{Links, PIECE, each_bit, near, piece, same, shifted},
 };
 
 const _: () = assert!(TILE == PIECE, "a row of a tile is one piece");
@@ -17,7 +17,7 @@ const AREA: usize = TILE * TILE;
 pub(super) const MIN_PIXELS: u16 = 16;
 
 /// Most surfaces that one tile can hold.
-pub(super) const MAX_SURFACES: usize = AREA / MIN_PIXELS as usize;
+pub(crate) const MAX_SURFACES: usize = AREA / MIN_PIXELS as usize;
 
 /// Number of classes that a method can tell pixels apart by, before there are surfaces: two bits beside the number of a surface.
 pub(crate) const CODES: usize = 4;
@@ -70,6 +70,7 @@ impl TileUnion {
     ///
     /// # Bound
     /// Two passes over the tile, and three over its runs.
+    #[inline(always)]
     pub(super) fn label<const CODED: bool>(
         &mut self,
         picture: &[DisparityPixel],
@@ -117,8 +118,10 @@ impl TileUnion {
                 }
                 numbers.iter_mut().skip(first).take(length(links.left, first)).for_each(|to| *to = number);
             }
-            for (label, number) in labels.iter_mut().zip(numbers) {
-                *label = number;
+            if let Some(whole) = labels.first_chunk_mut() {
+                *whole = numbers;
+            } else {
+                labels.iter_mut().zip(numbers).for_each(|(label, number)| *label = number);
             }
         }
         found
@@ -126,6 +129,7 @@ impl TileUnion {
 
     /// Finds the runs of the tile, counts their pixels and joins those that touch; returns how the pixels of each row hang together,
     /// and how many runs there are.
+    #[inline(always)]
     fn join_runs<const CODED: bool>(
         &mut self,
         picture: &[DisparityPixel],
@@ -151,9 +155,7 @@ impl TileUnion {
                     .iter_mut()
                     .zip(labels.get(from..from + tile.width).unwrap_or_default())
                     .for_each(|(to, from)| *to = *from);
-                let mut codes_before = [0; TILE];
-                codes_before[1..].copy_from_slice(&codes[..TILE - 1]);
-                links.left &= same(&codes, &codes_before);
+                links.left &= same(&codes, &shifted(&codes, 0));
                 up &= same(&codes, &codes_above);
                 codes_above = codes;
             }
@@ -182,6 +184,7 @@ impl TileUnion {
         &mut self.pixels
     }
 
+    #[inline(always)]
     fn root(&mut self, mut place: usize) -> usize {
         loop {
             let parent = usize::from(self.parent[place]);
@@ -193,6 +196,7 @@ impl TileUnion {
         }
     }
 
+    #[inline(always)]
     fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b)] = a.min(b) as u16;
@@ -200,6 +204,7 @@ impl TileUnion {
 }
 
 /// Pixels of the run that begins at pixel `first`: with it all that hang together with their left neighbour.
+#[inline(always)]
 const fn length(left: u32, first: usize) -> usize {
     1 + (left >> first >> 1).trailing_ones() as usize
 }

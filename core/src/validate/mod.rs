@@ -7,6 +7,7 @@ pub use settings::ValidateSettings;
 use heapless::Vec;
 
 use crate::{
+    arch::{self, Chosen, Steps},
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
     links::{Links, PIECE, VALUES, each_bit, near, piece},
@@ -36,6 +37,7 @@ pub struct SurfaceSize<const WIDTH: usize> {
     next: [Open; WIDTH],
     renumbered: [[u16; WIDTH]; 2],
     walk: Vec<Step, MAX_SURFACE_PX>,
+    chosen: Chosen,
 }
 
 /// A surface that may still grow.
@@ -73,6 +75,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
             next: [CLOSED; WIDTH],
             renumbered: [[0; WIDTH]; 2],
             walk: Vec::new(),
+            chosen: Chosen::PLAIN,
         }
     }
 
@@ -91,11 +94,21 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         Ok(())
     }
 
+    /// Has pictures gone through with the instructions of a backend.
+    pub(crate) const fn choose(&mut self, chosen: Chosen) {
+        self.chosen = chosen;
+    }
+
     /// Takes the small surfaces out of `picture`, rows of the configured width.
     pub fn run(&mut self, picture: &mut [DisparityPixel]) {
         if self.settings.min_surface_px <= 1 || self.width == 0 {
             return;
         }
+        arch::compiled(self.chosen, Rows { stage: self, picture });
+    }
+
+    #[inline(always)]
+    fn go_through(&mut self, picture: &mut [DisparityPixel]) {
         let mut open = 0;
         for y in 0..picture.len() / self.width {
             let (runs, used) = self.join_row(picture, y, open);
@@ -108,6 +121,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
 
     /// Joins row `y` with itself and with the row above, whose surfaces are the first `open` of the table; returns how
     /// many runs it has and how many entries of the table are used.
+    #[inline(always)]
     fn join_row(&mut self, picture: &[DisparityPixel], y: usize, open: usize) -> (usize, usize) {
         let Self { settings, width, above, here, table, .. } = self;
         let ValidateSettings { step_sixteenths: step, min_surface_px: limit } = *settings;
@@ -155,6 +169,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
 
     /// Takes out the small surfaces that do not reach the current row, which has `runs` runs, and numbers the others anew; returns
     /// how many there are.
+    #[inline(always)]
     fn end_row(&mut self, picture: &mut [DisparityPixel], runs: usize, used: usize) -> usize {
         let mut open = 0;
         {
@@ -224,6 +239,19 @@ impl<const WIDTH: usize> Default for SurfaceSize<WIDTH> {
     }
 }
 
+/// All rows of a picture.
+struct Rows<'a, const WIDTH: usize> {
+    stage: &'a mut SurfaceSize<WIDTH>,
+    picture: &'a mut [DisparityPixel],
+}
+
+impl<const WIDTH: usize> Steps for Rows<'_, WIDTH> {
+    #[inline(always)]
+    fn run(self) {
+        self.stage.go_through(self.picture);
+    }
+}
+
 /// The run of contiguous pixels that is being gone through.
 struct Run<'a> {
     table: &'a mut [Open],
@@ -239,11 +267,13 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
+    #[inline(always)]
     fn begin(&mut self, (x, y): (u32, usize), from: u32) {
         (self.label, self.first, self.from) = (NONE, (x as u16, y as u16), from);
     }
 
     /// Joins the run with a surface that touches it.
+    #[inline(always)]
     fn join(&mut self, other: u16) {
         self.label = match self.label {
             NONE => root(self.table, other),
@@ -252,6 +282,7 @@ impl Run<'_> {
     }
 
     /// Counts its pixels, `to` pixels with a value into the row, and gives its surface.
+    #[inline(always)]
     fn end(&mut self, to: u32) -> u16 {
         if self.label == NONE {
             self.label = self.used as u16;
@@ -265,6 +296,7 @@ impl Run<'_> {
 }
 
 /// The entry that stands for the surface of entry `label`; halves the path on the way.
+#[inline(always)]
 fn root(table: &mut [Open], mut label: u16) -> u16 {
     loop {
         let parent = table[usize::from(label)].parent;
@@ -278,6 +310,7 @@ fn root(table: &mut [Open], mut label: u16) -> u16 {
 }
 
 /// Joins two surfaces; returns the entry that stands for both.
+#[inline(always)]
 fn join(table: &mut [Open], a: u16, b: u16, limit: u16) -> u16 {
     let (a, b) = (root(table, a), root(table, b));
     // The older entry wins, so that labels of the row above stay valid the longest.

@@ -1,7 +1,7 @@
 //! The search by costs, for windows whose costs and places do not fit 16 bits together.
 
-use super::{PLACES, Vector, Wide, is_outside, outside_is_nothing, search_fits};
-use crate::arch::jobs::{Found, PAD, Right, Search};
+use super::{PLACES, Vector, Wide, by_blocks, is_outside, outside_is_nothing, search_fits};
+use crate::arch::jobs::{CostJob, Found, PAD, Search};
 
 /// What stands where there is no disparity, between the costs of bytes, less 32768; 16 times this is still a large number.
 const NO_COST: i16 = 0x07ff;
@@ -9,13 +9,8 @@ const NO_COST: i16 = 0x07ff;
 /// # Safety
 /// The processor must have the instructions of `V`.
 #[inline(always)]
-pub(in crate::arch) unsafe fn search_costs<V: Vector>(
-    search: &Search,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Option<Right<'_>>,
-    found: &mut Found,
-) {
+pub(in crate::arch) unsafe fn search_costs<V: Vector>(job: CostJob<'_, u8>) {
+    let CostJob { search, columns, work, right, found } = job;
     if search.range.is_empty() || !search_fits::<V>(search, columns, work, right.as_ref()) {
         return;
     }
@@ -28,15 +23,10 @@ pub(in crate::arch) unsafe fn search_costs<V: Vector>(
             begin_costs::<V>(search, columns, costs);
         }
         if search.is_small && tables.is_none() && inner == search.range {
-            match search.stride / V::LANES {
-                1 => return cost_run::<V, 1>(search, columns, costs, found),
-                2 => return cost_run::<V, 2>(search, columns, costs, found),
-                3 => return cost_run::<V, 3>(search, columns, costs, found),
-                4 => return cost_run::<V, 4>(search, columns, costs, found),
-                6 => return cost_run::<V, 6>(search, columns, costs, found),
-                8 => return cost_run::<V, 8>(search, columns, costs, found),
-                _ => (),
-            }
+            by_blocks!(search.stride / V::LANES,
+                BLOCKS => return cost_run::<V, BLOCKS>(search, columns, costs, found),
+                _ => ()
+            );
         }
         for x in search.range.clone() {
             if inner.contains(&x) {
@@ -107,7 +97,7 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
                     let (before, told) = (V::Wide::load(best), V::Wide::load(disparities));
                     let offered = top.sub(V::Wide::splat(place as i16)).sub(places);
                     before.min(cost).store(best);
-                    told.xor(told.xor(offered).and(before.greater(cost))).store(disparities);
+                    offered.select(before.greater(cost), told).store(disparities);
                 }
             }
         }
@@ -115,10 +105,10 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
             return;
         }
         let cost = least.least();
-        let above = search.above(cost);
+        let above = search.above(cost, found.weak(x - search.range.start));
         let bound = V::Wide::splat(above);
         let best = V::Wide::splat(cost);
-        let mut near = V::Wide::splat(0);
+        let mut near = V::Wide::none();
         // The first of equal places: those that are not equal are 32767 or so.
         let mut first = nothing;
         for place in (0..stride).step_by(V::Wide::LANES) {
@@ -127,14 +117,14 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
             }
             let cost = V::Wide::load(costs.add(place));
             let cost = if BORDER { outside_is_nothing::<V>(cost, place, &candidates) } else { cost };
-            near = near.add(bound.greater(cost));
+            near = V::Wide::count(near, bound.greater(cost));
             let here = places.add(V::Wide::splat(place as i16));
-            first = first.min(nothing.xor(nothing.xor(here).and(best.equal(cost))));
+            first = first.min(here.select(best.equal(cost), nothing));
         }
         let place = first.least() as usize % stride;
         // There is room on both sides.
         let beside = [*costs.add(place).sub(1), cost, *costs.add(place + 1)];
-        found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
+        found.put(x - search.range.start, place, beside, V::Wide::total(near), above);
     }
 }
 
@@ -169,17 +159,17 @@ unsafe fn cost_run<V: Vector, const BLOCKS: usize>(
                 }
             }
             let key = least.least();
-            let place = (key & 15) as usize * V::Wide::LANES + least.first_equal(V::Wide::splat(key));
+            let place = (key & 15) as usize * V::Wide::LANES + V::Wide::first(least.equal(V::Wide::splat(key)));
             let best = (key >> 4).wrapping_add(i16::MIN);
-            let above = search.above(best);
+            let above = search.above(best, found.weak(x - search.range.start));
             let bound = V::Wide::splat(above);
-            let mut near = V::Wide::splat(0);
+            let mut near = V::Wide::none();
             for half in 0..2 * BLOCKS {
-                near = near.add(bound.greater(V::Wide::load(costs.add(half * V::Wide::LANES))));
+                near = V::Wide::count(near, bound.greater(V::Wide::load(costs.add(half * V::Wide::LANES))));
             }
             // There is room on both sides.
             let beside = [*costs.add(place).sub(1), best, *costs.add(place + 1)];
-            let near = V::Wide::splat(0).sub(near).sum() as u16;
+            let near = V::Wide::total(near);
             found.put(x - search.range.start, place, beside, near, above);
         }
     }

@@ -2,20 +2,14 @@
 
 use core::ops::Range;
 
-use super::{PLACES, Vector, Wide, is_outside, outside_is_nothing, search_fits};
-use crate::arch::jobs::{Found, KeyLimits, PAD, Right, Search};
+use super::{PLACES, Vector, Wide, by_blocks, outside_is_nothing, search_fits};
+use crate::arch::jobs::{Found, KeyJob, KeyLimits, PAD, Search};
 
 /// # Safety
 /// The processor must have the instructions of `V`.
 #[inline(always)]
-pub(in crate::arch) unsafe fn search_keys<V: Vector>(
-    search: &Search,
-    limits: &KeyLimits,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Right<'_>,
-    found: &mut Found,
-) {
+pub(in crate::arch) unsafe fn search_keys<V: Vector>(job: KeyJob<'_>) {
+    let KeyJob { search, limits, columns, work, right, found } = job;
     if search.range.is_empty() || !search_fits::<V>(search, columns, work, Some(&right)) {
         return;
     }
@@ -30,19 +24,12 @@ pub(in crate::arch) unsafe fn search_keys<V: Vector>(
         for x in range.start..inner.start {
             key_pixel::<V, true>(search, limits, columns, keys, tables, x, found);
         }
-        match search.stride / V::LANES {
-            1 => key_run::<V, 1>(search, limits, columns, keys, tables, inner.clone(), found),
-            2 => key_run::<V, 2>(search, limits, columns, keys, tables, inner.clone(), found),
-            3 => key_run::<V, 3>(search, limits, columns, keys, tables, inner.clone(), found),
-            4 => key_run::<V, 4>(search, limits, columns, keys, tables, inner.clone(), found),
-            6 => key_run::<V, 6>(search, limits, columns, keys, tables, inner.clone(), found),
-            8 => key_run::<V, 8>(search, limits, columns, keys, tables, inner.clone(), found),
-            _ => {
-                for x in inner.clone() {
-                    key_pixel::<V, false>(search, limits, columns, keys, tables, x, found);
-                }
+        by_blocks!(search.stride / V::LANES,
+            BLOCKS => key_run::<V, BLOCKS>(search, limits, columns, keys, tables, inner.clone(), found),
+            _ => for x in inner.clone() {
+                key_pixel::<V, false>(search, limits, columns, keys, tables, x, found);
             }
-        }
+        );
         for x in inner.end..range.end {
             key_pixel::<V, true>(search, limits, columns, keys, tables, x, found);
         }
@@ -64,12 +51,10 @@ unsafe fn begin_keys<V: Vector>(search: &Search, columns: &[u8], keys: *mut i16)
             let mut sums = [places, places.add(V::Wide::splat(V::Wide::LANES as i16))];
             let inside = [end.greater(sums[0]), end.greater(sums[1])];
             for x in search.range.start - search.radius - 1..search.range.start + search.radius {
-                let [low, high] = V::load(columns.as_ptr().add(x * search.stride + first)).widen_shifted();
-                sums = [sums[0].add(low), sums[1].add(high)];
+                sums = V::load(columns.as_ptr().add(x * search.stride + first)).add_shifted(sums);
             }
             for half in 0..2 {
-                let key = nothing.xor(nothing.xor(sums[half]).and(inside[half]));
-                key.store(keys.add(first + half * V::Wide::LANES));
+                sums[half].select(inside[half], nothing).store(keys.add(first + half * V::Wide::LANES));
             }
         }
     }
@@ -96,40 +81,38 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
         let nothing = V::Wide::splat(i16::MAX);
         let turn = V::Wide::splat(0x7f);
         let table = tables[x % 2].add(x);
-        let mut least = nothing;
         for first in (0..stride).step_by(V::LANES) {
-            let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_shifted();
-            for half in 0..2 {
-                let place = first + half * V::Wide::LANES;
-                let key = V::Wide::load(keys.add(place)).add(change[half]);
-                key.store(keys.add(place));
-                if BORDER && is_outside::<V>(place, &candidates) {
-                    continue;
-                }
-                let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
-                least = least.min(key);
-                V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
-            }
+            let change = V::load(enter.add(first)).sub(V::load(leave.add(first)));
+            let before = [V::Wide::load(keys.add(first)), V::Wide::load(keys.add(first + V::Wide::LANES))];
+            let after = change.add_shifted(before);
+            after[0].store(keys.add(first));
+            after[1].store(keys.add(first + V::Wide::LANES));
         }
         if BORDER && candidates.is_empty() {
             return;
         }
-        let least = least.least();
-        let place = (least & 0x7f) as usize;
-        let above = limits.above(least);
-        let bound = V::Wide::splat(above);
-        let mut near = V::Wide::splat(0);
-        for place in (0..stride).step_by(V::Wide::LANES) {
-            if BORDER && is_outside::<V>(place, &candidates) {
-                continue;
-            }
+        // Vectors without candidates are passed over.
+        let places = candidates.start / V::Wide::LANES * V::Wide::LANES..if BORDER { candidates.end } else { stride };
+        let mut least = nothing;
+        for place in places.clone().step_by(V::Wide::LANES) {
             let key = V::Wide::load(keys.add(place));
             let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
-            near = near.add(bound.greater(key));
+            least = least.min(key);
+            V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
+        }
+        let least = least.least();
+        let place = (least & 0x7f) as usize;
+        let above = limits.above(least, found.weak(x - search.range.start));
+        let bound = V::Wide::splat(above);
+        let mut near = V::Wide::none();
+        for place in places.step_by(V::Wide::LANES) {
+            let key = V::Wide::load(keys.add(place));
+            let key = if BORDER { outside_is_nothing::<V>(key, place, &candidates) } else { key };
+            near = V::Wide::count(near, bound.greater(key));
         }
         // There is room on both sides.
         let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
-        found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
+        found.put(x - search.range.start, place, beside, V::Wide::total(near), above);
     }
 }
 
@@ -151,7 +134,7 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
     // SAFETY: that of this function.
     unsafe {
         let stride = BLOCKS * V::LANES;
-        let kept = BLOCKS <= 4;
+        let kept = BLOCKS <= V::KEPT;
         let turn = V::Wide::splat(0x7f);
         let mut current = [[V::Wide::splat(0); 2]; BLOCKS];
         if kept {
@@ -166,35 +149,37 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
             let table = tables[x % 2].add(x);
             let mut least = V::Wide::splat(i16::MAX);
             for block in 0..BLOCKS {
-                let first = block * V::LANES;
-                let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_shifted();
-                for half in 0..2 {
-                    let place = first + half * V::Wide::LANES;
-                    let before = if kept { current[block][half] } else { V::Wide::load(keys.add(place)) };
-                    let key = before.add(change[half]);
-                    if kept {
-                        current[block][half] = key;
-                    }
-                    key.store(keys.add(place));
-                    least = least.min(key);
-                    V::Wide::load(table.add(place)).min(key.xor(turn)).store(table.add(place));
+                let (first, second) = (block * V::LANES, block * V::LANES + V::Wide::LANES);
+                if !kept {
+                    current[block] = [V::Wide::load(keys.add(first)), V::Wide::load(keys.add(second))];
                 }
+                let change = V::load(enter.add(first)).sub(V::load(leave.add(first)));
+                // What belongs together is read and written together: two vectors in one instruction, where there is one.
+                let [low, high] = change.add_shifted(current[block]);
+                let offered = [V::Wide::load(table.add(first)), V::Wide::load(table.add(second))];
+                current[block] = [low, high];
+                low.store(keys.add(first));
+                high.store(keys.add(second));
+                least = least.min(low.min(high));
+                let best = [offered[0].min(low.xor(turn)), offered[1].min(high.xor(turn))];
+                best[0].store(table.add(first));
+                best[1].store(table.add(second));
             }
             let least = least.least();
             let place = (least & 0x7f) as usize;
-            let above = limits.above(least);
+            let above = limits.above(least, found.weak(x - search.range.start));
             let bound = V::Wide::splat(above);
-            let mut near = V::Wide::splat(0);
+            let mut near = V::Wide::none();
             for block in 0..BLOCKS {
                 for half in 0..2 {
                     let place = block * V::LANES + half * V::Wide::LANES;
                     let key = if kept { current[block][half] } else { V::Wide::load(keys.add(place)) };
-                    near = near.add(bound.greater(key));
+                    near = V::Wide::count(near, bound.greater(key));
                 }
             }
             // There is room on both sides.
             let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
-            found.put(x - search.range.start, place, beside, V::Wide::splat(0).sub(near).sum() as u16, above);
+            found.put(x - search.range.start, place, beside, V::Wide::total(near), above);
         }
     }
 }

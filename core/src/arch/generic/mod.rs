@@ -22,6 +22,8 @@ pub(super) use slide::slide_codes;
 pub(super) trait Vector: Copy {
     /// Bytes.
     const LANES: usize;
+    /// Vectors of a column up to which the keys of a pixel find room in registers.
+    const KEPT: usize;
     /// A left code, ready to be compared with right ones.
     type Code: Copy;
     /// A vector of as many bits, of 16-bit numbers.
@@ -39,8 +41,8 @@ pub(super) trait Vector: Copy {
     unsafe fn widen(self) -> [Self::Wide; 2];
     /// Numbers with a sign, in order.
     unsafe fn widen_signed(self) -> [Self::Wide; 2];
-    /// 128 times numbers with a sign, in order.
-    unsafe fn widen_shifted(self) -> [Self::Wide; 2];
+    /// Adds 128 times these numbers, with a sign, to others, in order.
+    unsafe fn add_shifted(self, to: [Self::Wide; 2]) -> [Self::Wide; 2];
 }
 
 /// A vector of 16-bit numbers with a sign.
@@ -50,6 +52,10 @@ pub(super) trait Vector: Copy {
 pub(super) trait Wide: Copy {
     /// Numbers.
     const LANES: usize;
+    /// For each number, whether.
+    type Mask: Copy;
+    /// How often a mask said so.
+    type Count: Copy;
 
     unsafe fn load(from: *const i16) -> Self;
     unsafe fn store(self, to: *mut i16);
@@ -57,20 +63,128 @@ pub(super) trait Wide: Copy {
     unsafe fn add(self, other: Self) -> Self;
     unsafe fn sub(self, other: Self) -> Self;
     unsafe fn min(self, other: Self) -> Self;
-
-    unsafe fn and(self, other: Self) -> Self;
     unsafe fn xor(self, other: Self) -> Self;
-    /// All bits where this is greater than the other.
-    unsafe fn greater(self, other: Self) -> Self;
-    unsafe fn equal(self, other: Self) -> Self;
-    unsafe fn least(self) -> i16;
-    /// The first place at which both hold the same; there must be one.
-    unsafe fn first_equal(self, other: Self) -> usize;
     /// 16 times each.
     unsafe fn times_16(self) -> Self;
-    /// The sum of numbers from 0 to 255.
-    unsafe fn sum(self) -> u32;
+    unsafe fn greater(self, other: Self) -> Self::Mask;
+    unsafe fn equal(self, other: Self) -> Self::Mask;
+    /// This where the mask says so, the other elsewhere.
+    unsafe fn select(self, mask: Self::Mask, other: Self) -> Self;
+    unsafe fn least(self) -> i16;
+    /// The first place of a mask that says so; there must be one.
+    unsafe fn first(mask: Self::Mask) -> usize;
+    unsafe fn none() -> Self::Count;
+    unsafe fn count(count: Self::Count, mask: Self::Mask) -> Self::Count;
+    /// All that was counted, in no more than 255 masks.
+    unsafe fn total(count: Self::Count) -> u16;
 }
+
+/// Functions of [`Vector`] that are one instruction each.
+macro_rules! byte_instructions {
+    ($load:ident, $store:ident, $add:ident, $sub:ident, $and:ident) => {
+        #[inline(always)]
+        unsafe fn load(from: *const u8) -> Self {
+            // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+            unsafe { Self($load(from.cast())) }
+        }
+
+        #[inline(always)]
+        unsafe fn store(self, to: *mut u8) {
+            // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+            unsafe { $store(to.cast(), self.0) }
+        }
+
+        #[inline(always)]
+        unsafe fn add(self, other: Self) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($add(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        unsafe fn sub(self, other: Self) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($sub(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        unsafe fn and(self, other: Self) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($and(self.0, other.0)) }
+        }
+    };
+}
+pub(super) use byte_instructions;
+
+/// Functions of [`Wide`] that are one instruction each.
+macro_rules! word_instructions {
+    ($load:ident, $store:ident, $splat:ident, $add:ident, $sub:ident, $min:ident, $xor:ident, $shift:ident) => {
+        #[inline(always)]
+        unsafe fn load(from: *const i16) -> Self {
+            // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+            unsafe { Self($load(from.cast())) }
+        }
+
+        #[inline(always)]
+        unsafe fn store(self, to: *mut i16) {
+            // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+            unsafe { $store(to.cast(), self.0) }
+        }
+
+        #[inline(always)]
+        unsafe fn splat(number: i16) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($splat(number)) }
+        }
+
+        #[inline(always)]
+        unsafe fn add(self, other: Self) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($add(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        unsafe fn sub(self, other: Self) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($sub(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        unsafe fn min(self, other: Self) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($min(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        unsafe fn xor(self, other: Self) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($xor(self.0, other.0)) }
+        }
+
+        #[inline(always)]
+        unsafe fn times_16(self) -> Self {
+            // SAFETY: the caller guarantees the instructions.
+            unsafe { Self($shift::<4>(self.0)) }
+        }
+    };
+}
+pub(super) use word_instructions;
+
+/// Calls what is compiled for a number of vectors in a column: the usual numbers, that is; any other does `otherwise`.
+macro_rules! by_blocks {
+    ($blocks:expr, $n:ident => $call:expr, _ => $otherwise:expr $(,)?) => {
+        by_blocks!(@ $blocks, $n, $call, $otherwise, 1 2 3 4 6 8)
+    };
+    (@ $blocks:expr, $n:ident, $call:expr, $otherwise:expr, $($number:literal)*) => {
+        match $blocks {
+            $($number => {
+                const $n: usize = $number;
+                $call
+            })*
+            _ => $otherwise,
+        }
+    };
+}
+use by_blocks;
 
 /// Bytes that let nothing through, everything, and nothing again; long enough for the widest vector.
 static MASKS: [u8; 3 * WIDEST] = {
@@ -141,6 +255,6 @@ unsafe fn outside_is_nothing<V: Vector>(number: V::Wide, place: usize, candidate
         let places = V::Wide::load(PLACES.as_ptr()).add(V::Wide::splat(place as i16));
         let from = places.greater(V::Wide::splat(candidates.start as i16 - 1));
         let to = V::Wide::splat(candidates.end as i16).greater(places);
-        nothing.xor(nothing.xor(number).and(from.and(to)))
+        number.select(from, nothing).select(to, nothing)
     }
 }

@@ -1,6 +1,6 @@
 //! A row of codes into the sums of its columns, and another one out.
 
-use super::{Vector, mask};
+use super::{Vector, by_blocks, mask};
 use crate::arch::jobs::{CodeRow, SlideCodes};
 
 /// # Safety
@@ -25,15 +25,10 @@ pub(in crate::arch) unsafe fn slide_codes<V: Vector>(job: SlideCodes<'_>) {
     unsafe {
         let sizes = [width, stride, disparities, back];
         let Some(leave) = leave else { return slide::<V, false, 0>(columns, sizes, enter, enter) };
-        match stride / V::LANES {
-            1 => slide::<V, true, 1>(columns, sizes, enter, leave),
-            2 => slide::<V, true, 2>(columns, sizes, enter, leave),
-            3 => slide::<V, true, 3>(columns, sizes, enter, leave),
-            4 => slide::<V, true, 4>(columns, sizes, enter, leave),
-            6 => slide::<V, true, 6>(columns, sizes, enter, leave),
-            8 => slide::<V, true, 8>(columns, sizes, enter, leave),
-            _ => slide::<V, true, 0>(columns, sizes, enter, leave),
-        }
+        by_blocks!(stride / V::LANES,
+            BLOCKS => slide::<V, true, BLOCKS>(columns, sizes, enter, leave),
+            _ => slide::<V, true, 0>(columns, sizes, enter, leave)
+        );
     }
 }
 
@@ -54,28 +49,45 @@ unsafe fn slide<V: Vector, const LEAVES: bool, const BLOCKS: usize>(
         let stride = if BLOCKS == 0 { stride } else { BLOCKS * V::LANES };
         let last = stride - V::LANES;
         let tail = mask::<V>(last, 0, disparities);
-        for x in 0..width {
+        let columns = columns.as_mut_ptr();
+        for x in 0..width.min(back) {
             let codes = [V::code(*enter.left.add(x)), V::code(*leave.left.add(x))];
-            let column = columns.as_mut_ptr().add(x * stride);
-            if x >= back {
-                let mut place = 0;
-                while place < last {
-                    let change = change::<V, LEAVES>(codes, &enter, &leave, x + place);
-                    V::load(column.add(place)).add(change).store(column.add(place));
-                    place += V::LANES;
-                }
-                let change = change::<V, LEAVES>(codes, &enter, &leave, x + last).and(tail);
-                V::load(column.add(last)).add(change).store(column.add(last));
-            } else {
-                // What lies in front of the row must leave no trace.
-                let mut place = 0;
-                while place < stride {
-                    let change = change::<V, LEAVES>(codes, &enter, &leave, x + place);
-                    let change = change.and(mask::<V>(place, back - x, disparities));
-                    V::load(column.add(place)).add(change).store(column.add(place));
-                    place += V::LANES;
-                }
+            let column = columns.add(x * stride);
+            // What lies in front of the row must leave no trace.
+            let mut place = 0;
+            while place < stride {
+                let change = change::<V, LEAVES>(codes, &enter, &leave, x + place);
+                let change = change.and(mask::<V>(place, back - x, disparities));
+                V::load(column.add(place)).add(change).store(column.add(place));
+                place += V::LANES;
             }
+        }
+        for x in back..width {
+            let codes = [V::code(*enter.left.add(x)), V::code(*leave.left.add(x))];
+            let column = columns.add(x * stride);
+            if 0 < BLOCKS && BLOCKS <= V::KEPT {
+                // All is read before anything is written: two vectors in one instruction, where there is one.
+                let mut changes = [change::<V, LEAVES>(codes, &enter, &leave, x); BLOCKS];
+                for block in 1..BLOCKS {
+                    changes[block] = change::<V, LEAVES>(codes, &enter, &leave, x + block * V::LANES);
+                }
+                changes[BLOCKS - 1] = changes[BLOCKS - 1].and(tail);
+                for block in 0..BLOCKS {
+                    changes[block] = changes[block].add(V::load(column.add(block * V::LANES)));
+                }
+                for block in 0..BLOCKS {
+                    changes[block].store(column.add(block * V::LANES));
+                }
+                continue;
+            }
+            let mut place = 0;
+            while place < last {
+                let change = change::<V, LEAVES>(codes, &enter, &leave, x + place);
+                V::load(column.add(place)).add(change).store(column.add(place));
+                place += V::LANES;
+            }
+            let change = change::<V, LEAVES>(codes, &enter, &leave, x + last).and(tail);
+            V::load(column.add(last)).add(change).store(column.add(last));
         }
     }
 }

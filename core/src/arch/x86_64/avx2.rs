@@ -2,8 +2,8 @@
 
 use core::arch::x86_64::*;
 
-use super::sse41::DIFFERENT;
-use crate::arch::generic::{Vector, Wide};
+use super::sse41::{DIFFERENT, least_of_eight};
+use crate::arch::generic::{Vector, Wide, byte_instructions, word_instructions};
 
 #[derive(Clone, Copy)]
 pub(super) struct Avx2(__m256i);
@@ -14,38 +14,11 @@ pub(super) struct Words16(__m256i);
 
 impl Vector for Avx2 {
     const LANES: usize = 32;
+    const KEPT: usize = 4;
     type Code = [__m256i; 2];
     type Wide = Words16;
 
-    #[inline(always)]
-    unsafe fn load(from: *const u8) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_loadu_si256(from.cast())) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut u8) {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { _mm256_storeu_si256(to.cast(), self.0) }
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_add_epi8(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_sub_epi8(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn and(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_and_si256(self.0, other.0)) }
-    }
+    byte_instructions!(_mm256_loadu_si256, _mm256_storeu_si256, _mm256_add_epi8, _mm256_sub_epi8, _mm256_and_si256);
 
     #[inline(always)]
     unsafe fn code(code: u8) -> [__m256i; 2] {
@@ -72,7 +45,7 @@ impl Vector for Avx2 {
 
     #[inline(always)]
     unsafe fn widen(self) -> [Words16; 2] {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        // SAFETY: the caller guarantees the instructions.
         unsafe {
             let halves = [_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0)];
             [Words16(_mm256_cvtepu8_epi16(halves[0])), Words16(_mm256_cvtepu8_epi16(halves[1]))]
@@ -81,7 +54,7 @@ impl Vector for Avx2 {
 
     #[inline(always)]
     unsafe fn widen_signed(self) -> [Words16; 2] {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        // SAFETY: the caller guarantees the instructions.
         unsafe {
             let halves = [_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0)];
             [Words16(_mm256_cvtepi8_epi16(halves[0])), Words16(_mm256_cvtepi8_epi16(halves[1]))]
@@ -89,112 +62,84 @@ impl Vector for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn widen_shifted(self) -> [Words16; 2] {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+    unsafe fn add_shifted(self, to: [Words16; 2]) -> [Words16; 2] {
+        // SAFETY: the caller guarantees the instructions.
         unsafe {
-            let halves = [_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0)];
-            [
-                Words16(_mm256_slli_epi16::<7>(_mm256_cvtepi8_epi16(halves[0]))),
-                Words16(_mm256_slli_epi16::<7>(_mm256_cvtepi8_epi16(halves[1]))),
-            ]
+            let [Words16(low), Words16(high)] = self.widen_signed();
+            [to[0].add(Words16(_mm256_slli_epi16::<7>(low))), to[1].add(Words16(_mm256_slli_epi16::<7>(high)))]
         }
     }
 }
 
 impl Wide for Words16 {
     const LANES: usize = 16;
+    type Mask = __m256i;
+    type Count = __m256i;
+
+    word_instructions!(
+        _mm256_loadu_si256,
+        _mm256_storeu_si256,
+        _mm256_set1_epi16,
+        _mm256_add_epi16,
+        _mm256_sub_epi16,
+        _mm256_min_epi16,
+        _mm256_xor_si256,
+        _mm256_slli_epi16
+    );
 
     #[inline(always)]
-    unsafe fn load(from: *const i16) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_loadu_si256(from.cast())) }
+    unsafe fn greater(self, other: Self) -> __m256i {
+        // SAFETY: the caller guarantees the instructions.
+        unsafe { _mm256_cmpgt_epi16(self.0, other.0) }
     }
 
     #[inline(always)]
-    unsafe fn store(self, to: *mut i16) {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { _mm256_storeu_si256(to.cast(), self.0) }
+    unsafe fn equal(self, other: Self) -> __m256i {
+        // SAFETY: the caller guarantees the instructions.
+        unsafe { _mm256_cmpeq_epi16(self.0, other.0) }
     }
 
     #[inline(always)]
-    unsafe fn splat(number: i16) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_set1_epi16(number)) }
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_add_epi16(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_sub_epi16(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn min(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_min_epi16(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn and(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_and_si256(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn xor(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_xor_si256(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn greater(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_cmpgt_epi16(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn equal(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_cmpeq_epi16(self.0, other.0)) }
+    unsafe fn select(self, mask: __m256i, other: Self) -> Self {
+        // SAFETY: the caller guarantees the instructions.
+        unsafe { Self(_mm256_blendv_epi8(other.0, self.0, mask)) }
     }
 
     #[inline(always)]
     unsafe fn least(self) -> i16 {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+        // SAFETY: the caller guarantees the instructions.
         unsafe {
-            let half = _mm_min_epi16(_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0));
-            // The instruction compares numbers without a sign.
-            let turned = _mm_xor_si128(half, _mm_set1_epi16(i16::MIN));
-            (_mm_cvtsi128_si32(_mm_minpos_epu16(turned)) as i16) ^ i16::MIN
+            let halves = [_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0)];
+            least_of_eight(_mm_min_epi16(halves[0], halves[1]))
         }
     }
 
     #[inline(always)]
-    unsafe fn first_equal(self, other: Self) -> usize {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        let equal = unsafe { _mm256_movemask_epi8(_mm256_cmpeq_epi16(self.0, other.0)) };
-        equal.trailing_zeros() as usize / 2
+    unsafe fn first(mask: __m256i) -> usize {
+        // SAFETY: the caller guarantees the instructions.
+        unsafe { _mm256_movemask_epi8(mask).trailing_zeros() as usize / 2 }
     }
 
     #[inline(always)]
-    unsafe fn times_16(self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm256_slli_epi16::<4>(self.0)) }
+    unsafe fn none() -> __m256i {
+        // SAFETY: the caller guarantees the instructions.
+        unsafe { _mm256_setzero_si256() }
+    }
+
+    /// True is -1.
+    #[inline(always)]
+    unsafe fn count(count: __m256i, mask: __m256i) -> __m256i {
+        // SAFETY: the caller guarantees the instructions.
+        unsafe { _mm256_sub_epi16(count, mask) }
     }
 
     #[inline(always)]
-    unsafe fn sum(self) -> u32 {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
+    unsafe fn total(count: __m256i) -> u16 {
+        // SAFETY: the caller guarantees the instructions.
         unsafe {
-            let half = _mm_add_epi16(_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0));
+            let half = _mm_add_epi16(_mm256_castsi256_si128(count), _mm256_extracti128_si256::<1>(count));
             let sums = _mm_sad_epu8(half, _mm_setzero_si128());
-            _mm_cvtsi128_si32(_mm_add_epi32(sums, _mm_unpackhi_epi64(sums, sums))) as u32
+            _mm_cvtsi128_si32(_mm_add_epi32(sums, _mm_unpackhi_epi64(sums, sums))) as u16
         }
     }
 }

@@ -1,6 +1,7 @@
 //! x86-64: what the processor has, and the functions that are compiled for it.
 
 mod avx2;
+mod avx512;
 mod sse2;
 mod sse41;
 
@@ -8,37 +9,45 @@ use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
 use super::{
     Backend, Chosen, Steps, generic,
-    jobs::{Found, KeyLimits, Right, Search, SlideCodes},
+    jobs::{CostJob, KeyJob, SlideCodes},
 };
 use avx2::Avx2;
+use avx512::Avx512;
 use sse2::Sse2;
 use sse41::Sse41;
 
 /// Asks the processor, and of wide registers whether the operating system keeps them.
 ///
-/// Source: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 1, sections 14.3 and 14.7.1.
+/// Source: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 1, sections 14.3, 14.7.1 and 15.2.
 pub(super) fn is_available(backend: Backend) -> bool {
     match backend {
         Backend::Plain | Backend::Sse2 => true,
-        Backend::Sse41 => {
-            let (_, features) = features();
-            has(features, 9) && has(features, 19)
-        }
-        Backend::Avx2 => {
-            let (highest, features) = features();
-            let [saves, avx] = [27, 28].map(|bit| has(features, bit));
-            // Registers 1 and 2 of those that the system saves: the lower and upper halves.
-            highest >= 7 && saves && avx && saved_registers() & 6 == 6 && {
-                let features = __cpuid_count(7, 0).ebx;
-                // AVX2, and BMI1 and BMI2, which came with it.
-                [5, 3, 8].into_iter().all(|bit| has(features, bit))
+        Backend::Sse41 => all(features().1, [9, 19]),
+        Backend::Avx2 => has_avx2(),
+        Backend::Avx512 => {
+            // The masks, and the upper halves and the second half of the wide registers; F16C, FMA and POPCNT, which came before.
+            has_avx2() && saved_registers() & 0xe0 == 0xe0 && all(features().1, [29, 12, 23]) && {
+                let features = __cpuid_count(7, 0);
+                // AVX512F, BW and VL; BITALG.
+                all(features.ebx, [16, 30, 31]) && all(features.ecx, [12])
             }
         }
+        _ => false,
     }
 }
 
-const fn has(features: u32, bit: u32) -> bool {
-    features >> bit & 1 == 1
+fn has_avx2() -> bool {
+    let (highest, features) = features();
+    // OSXSAVE and AVX; registers 1 and 2 of those that the system saves: the lower and upper halves.
+    highest >= 7 && all(features, [27, 28]) && saved_registers() & 6 == 6 && {
+        // AVX2, and BMI1 and BMI2, which came with it.
+        all(__cpuid_count(7, 0).ebx, [5, 3, 8])
+    }
+}
+
+/// Whether all of these bits are set.
+fn all<const N: usize>(features: u32, bits: [u32; N]) -> bool {
+    bits.into_iter().all(|bit| features >> bit & 1 == 1)
 }
 
 /// The highest leaf, and the features of leaf 1.
@@ -57,99 +66,83 @@ fn saved_registers() -> u64 {
     unsafe { ask() }
 }
 
+/// The algorithm with a vector, compiled for its instructions.
 macro_rules! functions {
-    ($slide:ident, $keys:ident, $costs:ident, $vector:ty, $features:literal) => {
-        #[target_feature(enable = $features)]
-        fn $slide(job: SlideCodes<'_>) {
-            // SAFETY: this function is only called where the instructions are.
-            unsafe { generic::slide_codes::<$vector>(job) }
-        }
+    ($name:ident, $vector:ty, $features:literal) => {
+        mod $name {
+            use super::*;
 
-        #[target_feature(enable = $features)]
-        fn $keys(
-            search: &Search,
-            limits: &KeyLimits,
-            columns: &[u8],
-            work: &mut [i16],
-            right: Right<'_>,
-            found: &mut Found,
-        ) {
-            // SAFETY: this function is only called where the instructions are.
-            unsafe { generic::search_keys::<$vector>(search, limits, columns, work, right, found) }
-        }
+            #[target_feature(enable = $features)]
+            pub(super) fn slide_codes(job: SlideCodes<'_>) {
+                // SAFETY: this function is only called where the instructions are.
+                unsafe { generic::slide_codes::<$vector>(job) }
+            }
 
-        #[target_feature(enable = $features)]
-        fn $costs(search: &Search, columns: &[u8], work: &mut [i16], right: Option<Right<'_>>, found: &mut Found) {
-            // SAFETY: this function is only called where the instructions are.
-            unsafe { generic::search_costs::<$vector>(search, columns, work, right, found) }
+            #[target_feature(enable = $features)]
+            pub(super) fn search_keys(job: KeyJob<'_>) {
+                // SAFETY: this function is only called where the instructions are.
+                unsafe { generic::search_keys::<$vector>(job) }
+            }
+
+            #[target_feature(enable = $features)]
+            pub(super) fn search_costs(job: CostJob<'_, u8>) {
+                // SAFETY: this function is only called where the instructions are.
+                unsafe { generic::search_costs::<$vector>(job) }
+            }
         }
     };
 }
 
-functions!(slide_sse2, keys_sse2, costs_sse2, Sse2, "sse2");
-functions!(slide_sse41, keys_sse41, costs_sse41, Sse41, "ssse3,sse4.1");
-functions!(slide_avx2, keys_avx2, costs_avx2, Avx2, "avx2,bmi1,bmi2");
+functions!(with_sse2, Sse2, "sse2");
+functions!(with_sse41, Sse41, "ssse3,sse4.1");
+functions!(with_avx2, Avx2, "avx2,bmi1,bmi2");
+functions!(with_avx512, Avx512, "avx512f,avx512bw,avx512vl,avx512bitalg,bmi1,bmi2,popcnt");
+
+/// Calls the function of the chosen backend.
+macro_rules! call {
+    ($chosen:expr, $function:ident($job:expr)) => {
+        // SAFETY: `Chosen` holds only a backend whose instructions the processor was found to have.
+        unsafe {
+            match $chosen.backend() {
+                Backend::Avx512 => with_avx512::$function($job),
+                Backend::Avx2 => with_avx2::$function($job),
+                Backend::Sse41 => with_sse41::$function($job),
+                _ => with_sse2::$function($job),
+            }
+        }
+    };
+}
 
 /// Lets a row of codes in and another one out.
 pub(super) fn slide_codes(chosen: Chosen, job: SlideCodes<'_>) {
-    // SAFETY: `Chosen` holds only a backend whose instructions the processor was found to have.
-    unsafe {
-        match chosen.backend() {
-            Backend::Avx2 => slide_avx2(job),
-            Backend::Sse41 => slide_sse41(job),
-            Backend::Plain | Backend::Sse2 => slide_sse2(job),
-        }
-    }
+    call!(chosen, slide_codes(job));
 }
 
 /// Searches by keys.
-pub(super) fn search_keys(
-    chosen: Chosen,
-    search: &Search,
-    limits: &KeyLimits,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Right<'_>,
-    found: &mut Found,
-) {
-    // SAFETY: as in `slide_codes`.
-    unsafe {
-        match chosen.backend() {
-            Backend::Avx2 => keys_avx2(search, limits, columns, work, right, found),
-            Backend::Sse41 => keys_sse41(search, limits, columns, work, right, found),
-            Backend::Plain | Backend::Sse2 => keys_sse2(search, limits, columns, work, right, found),
-        }
-    }
+pub(super) fn search_keys(chosen: Chosen, job: KeyJob<'_>) {
+    call!(chosen, search_keys(job));
 }
 
 /// Searches by costs.
-pub(super) fn search_costs(
-    chosen: Chosen,
-    search: &Search,
-    columns: &[u8],
-    work: &mut [i16],
-    right: Option<Right<'_>>,
-    found: &mut Found,
-) {
-    // SAFETY: as in `slide_codes`.
-    unsafe {
-        match chosen.backend() {
-            Backend::Avx2 => costs_avx2(search, columns, work, right, found),
-            Backend::Sse41 => costs_sse41(search, columns, work, right, found),
-            Backend::Plain | Backend::Sse2 => costs_sse2(search, columns, work, right, found),
-        }
-    }
+pub(super) fn search_costs(chosen: Chosen, job: CostJob<'_, u8>) {
+    call!(chosen, search_costs(job));
 }
 
 /// Runs steps with the instructions that were chosen: plain Rust, of which the compiler makes vectors.
 #[inline(always)]
 pub(super) fn compiled(chosen: Chosen, steps: impl Steps) {
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,bmi1,bmi2")]
+    fn with_avx512(steps: impl Steps) {
+        steps.run();
+    }
     #[target_feature(enable = "avx2,bmi1,bmi2")]
     fn with_avx2(steps: impl Steps) {
         steps.run();
     }
     match chosen.backend() {
-        // SAFETY: as in `slide_codes`.
+        // SAFETY: `Chosen` holds only a backend whose instructions the processor was found to have.
+        Backend::Avx512 => unsafe { with_avx512(steps) },
+        // SAFETY: as above.
         Backend::Avx2 => unsafe { with_avx2(steps) },
         _ => steps.run(),
     }

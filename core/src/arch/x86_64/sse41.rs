@@ -2,15 +2,15 @@
 
 use core::arch::x86_64::*;
 
-use super::sse2::Words;
-use crate::arch::generic::{Vector, Wide};
+use super::sse2::{eight_words, sixteen_bytes};
+use crate::arch::generic::{Vector, Wide, byte_instructions, word_instructions};
 
 #[derive(Clone, Copy)]
 pub(super) struct Sse41(__m128i);
 
 /// Eight numbers, the least of which one instruction finds.
 #[derive(Clone, Copy)]
-pub(super) struct Words41(Words);
+pub(super) struct Words(__m128i);
 
 /// For each four bits the number of bits by which each other four differ from them.
 pub(super) static DIFFERENT: [[u8; 16]; 16] = {
@@ -24,44 +24,14 @@ pub(super) static DIFFERENT: [[u8; 16]; 16] = {
 };
 
 impl Vector for Sse41 {
-    const LANES: usize = 16;
     type Code = [__m128i; 2];
-    type Wide = Words41;
 
-    #[inline(always)]
-    unsafe fn load(from: *const u8) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm_loadu_si128(from.cast())) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut u8) {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { _mm_storeu_si128(to.cast(), self.0) }
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm_add_epi8(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm_sub_epi8(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn and(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(_mm_and_si128(self.0, other.0)) }
-    }
+    sixteen_bytes!(Words);
 
     #[inline(always)]
     unsafe fn code(code: u8) -> [__m128i; 2] {
         let [low, high] = [&DIFFERENT[usize::from(code & 15)], &DIFFERENT[usize::from(code >> 4)]];
-        // SAFETY: the caller guarantees the instructions.
+        // SAFETY: both rows have 16 bytes; the caller guarantees the instructions.
         unsafe { [_mm_loadu_si128(low.as_ptr().cast()), _mm_loadu_si128(high.as_ptr().cast())] }
     }
 
@@ -75,125 +45,27 @@ impl Vector for Sse41 {
             Self(_mm_add_epi8(low, high))
         }
     }
+}
+
+impl Wide for Words {
+    eight_words!();
 
     #[inline(always)]
-    unsafe fn widen(self) -> [Words41; 2] {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe {
-            let zero = _mm_setzero_si128();
-            [Words41(Words(_mm_unpacklo_epi8(self.0, zero))), Words41(Words(_mm_unpackhi_epi8(self.0, zero)))]
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn widen_signed(self) -> [Words41; 2] {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe {
-            let high = _mm_unpackhi_epi64(self.0, self.0);
-            [Words41(Words(_mm_cvtepi8_epi16(self.0))), Words41(Words(_mm_cvtepi8_epi16(high)))]
-        }
-    }
-
-    /// A byte in the upper half is 256 times the number.
-    #[inline(always)]
-    unsafe fn widen_shifted(self) -> [Words41; 2] {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe {
-            let zero = _mm_setzero_si128();
-            let [low, high] = [_mm_unpacklo_epi8(zero, self.0), _mm_unpackhi_epi8(zero, self.0)];
-            [Words41(Words(_mm_srai_epi16::<1>(low))), Words41(Words(_mm_srai_epi16::<1>(high)))]
-        }
+    unsafe fn least(self) -> i16 {
+        // SAFETY: the caller guarantees the instructions.
+        unsafe { least_of_eight(self.0) }
     }
 }
 
-impl Wide for Words41 {
-    const LANES: usize = 8;
-
-    #[inline(always)]
-    unsafe fn load(from: *const i16) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(Words::load(from)) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut i16) {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { self.0.store(to) }
-    }
-
-    #[inline(always)]
-    unsafe fn splat(number: i16) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(Words::splat(number)) }
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(self.0.add(other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(self.0.sub(other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn min(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(self.0.min(other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn and(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(self.0.and(other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn xor(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(self.0.xor(other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn greater(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(self.0.greater(other.0)) }
-    }
-
-    #[inline(always)]
-    unsafe fn equal(self, other: Self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(self.0.equal(other.0)) }
-    }
-
-    /// The instruction compares numbers without a sign.
-    #[inline(always)]
-    unsafe fn least(self) -> i16 {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe {
-            let turned = _mm_xor_si128(self.0.0, _mm_set1_epi16(i16::MIN));
-            (_mm_cvtsi128_si32(_mm_minpos_epu16(turned)) as i16) ^ i16::MIN
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn first_equal(self, other: Self) -> usize {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { self.0.first_equal(other.0) }
-    }
-
-    #[inline(always)]
-    unsafe fn times_16(self) -> Self {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { Self(self.0.times_16()) }
-    }
-
-    #[inline(always)]
-    unsafe fn sum(self) -> u32 {
-        // SAFETY: the caller guarantees the instructions and what lies behind pointers.
-        unsafe { self.0.sum() }
+/// The instruction compares numbers without a sign.
+///
+/// # Safety
+/// The processor must have SSE4.1.
+#[inline(always)]
+pub(super) unsafe fn least_of_eight(numbers: __m128i) -> i16 {
+    // SAFETY: that of this function.
+    unsafe {
+        let turned = _mm_xor_si128(numbers, _mm_set1_epi16(i16::MIN));
+        (_mm_cvtsi128_si32(_mm_minpos_epu16(turned)) as i16) ^ i16::MIN
     }
 }

@@ -106,10 +106,10 @@ fn settings_with(random: &mut Random, window: Option<[u16; 2]>) -> MatchSettings
     if fits { settings } else { MatchSettings { wide_window_width: 0, ..settings } }
 }
 
-/// A pair as high as it takes for some rows under the window.
-fn pair_for(random: &mut Random, settings: &MatchSettings, width: usize) -> Pair {
+/// A pair as high as it takes for up to `most` rows under the window.
+fn pair_for(random: &mut Random, settings: &MatchSettings, width: usize, most: u32) -> Pair {
     let [_, margin] = settings.margins();
-    let height = 2 * margin + 1 + random.below(12) as usize;
+    let height = 2 * margin + 1 + random.below(most) as usize;
     // Spans are drawn up to four columns from either end.
     let mut pair = pair(random, width.max(4), height);
     for row in pair.left.iter_mut().chain(&mut pair.right) {
@@ -126,7 +126,7 @@ fn every_window_gives_the_same_with_every_backend() {
     for window in edges().flat_map(|width| edges().map(move |height| [width, height])) {
         let settings = settings_with(&mut random, Some(window));
         let width = 250 + random.below(200) as usize;
-        let pair = pair_for(&mut random, &settings, width);
+        let pair = pair_for(&mut random, &settings, width, 12);
         runner.check(&settings, &pair);
     }
     runner.report();
@@ -138,26 +138,32 @@ fn every_width_gives_the_same_with_every_backend() {
     let mut runner = Runner::new();
     for width in (1..=200).chain(REAL) {
         let settings = settings_with(&mut random, None);
-        let pair = pair_for(&mut random, &settings, width);
+        let pair = pair_for(&mut random, &settings, width, 12);
         runner.check(&settings, &pair);
     }
     runner.report();
 }
 
-/// A million rows in a release build; without optimisation of everything it would take minutes.
+/// Rows of every width from 1 to 200 under windows of every size, 10 000 of them or `FENCEPOST_ROWS`.
 #[test]
 fn random_rows_give_the_same_with_every_backend() {
     let mut random = Random::seeded("rows of the backends", 0x5eed_0103);
     let mut runner = Runner::new();
-    let wanted = if cfg!(debug_assertions) { 10_000 } else { 1_000_000 };
-    let mut done = 0;
-    while done < wanted {
-        let settings = settings_with(&mut random, None);
-        let width = 24 + random.below(200) as usize;
-        let pair = pair_for(&mut random, &settings, width);
+    let wanted = std::env::var("FENCEPOST_ROWS").map_or(10_000, |rows| rows.parse().unwrap());
+    let edges = || (MatchSettings::MIN_WINDOW..=MatchSettings::MAX_WINDOW).step_by(2);
+    let windows: Vec<_> = edges().flat_map(|width| edges().map(move |height| [width, height])).collect();
+    let mut matched = 0;
+    for round in 0.. {
+        if matched >= wanted {
+            break;
+        }
+        let settings = settings_with(&mut random, Some(windows[round % windows.len()]));
+        let pair = pair_for(&mut random, &settings, 1 + round % 200, 80);
         runner.check(&settings, &pair);
-        done += pair.left.len();
+        let [_, margin] = settings.margins();
+        matched += pair.left.len() - 2 * margin;
     }
+    std::println!("{matched} rows under the window");
     runner.report();
 }
 
@@ -187,7 +193,11 @@ fn a_backend_that_is_not_there_is_refused() {
         (Backend::Sse2, std::is_x86_feature_detected!("sse2")),
         (Backend::Sse41, std::is_x86_feature_detected!("sse4.1") && std::is_x86_feature_detected!("ssse3")),
         (Backend::Avx2, std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("bmi2")),
+        (Backend::Avx512, std::is_x86_feature_detected!("avx512bw") && std::is_x86_feature_detected!("avx512bitalg")),
+        (Backend::Neon, false),
     ] {
         assert_eq!(backend.is_available(), found, "{}", backend.name());
     }
+    #[cfg(target_arch = "aarch64")]
+    assert_eq!(Backend::fastest(), Backend::Neon);
 }
