@@ -38,7 +38,7 @@ fn entry_planted_deep_stack(at: &[u8]) -> u8 {
     core::hint::black_box(&table).iter().fold(0, |sum, byte| sum ^ byte)
 }
 
-/// Stack by the size of the input, which the language itself does not offer.
+// Stack by the size of the input, which the language itself does not offer.
 #[cfg(all(feature = "plant-unbounded-stack", target_arch = "arm"))]
 core::arch::global_asm!(
     ".thumb_func",

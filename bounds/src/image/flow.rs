@@ -43,6 +43,8 @@ pub(crate) enum FlawKind {
     UnknownFrame(String),
     /// Two ways lead to an instruction with different depths.
     DifferentDepths { one: i64, other: i64 },
+    /// The compiler says that the frame is larger.
+    SmallerThanTold { found: u32, told: u32 },
     /// Code that is not known where it is reached.
     NoCode,
     /// A jump into the middle of another function.
@@ -60,6 +62,9 @@ impl fmt::Display for Flaw {
             FlawKind::UnknownFrame(text) => write!(f, "frame of unknown size in {function} at {address:#x}: {text}"),
             FlawKind::DifferentDepths { one, other } => {
                 write!(f, "frame of unknown size in {function} at {address:#x}: {one} or {other} bytes")
+            }
+            FlawKind::SmallerThanTold { found, told } => {
+                write!(f, "frame of unknown size in {function}: {found} bytes by its code, {told} by the compiler")
             }
             FlawKind::NoCode => write!(f, "{function} runs into no code at {address:#x}"),
             FlawKind::IntoTheMiddle(target) => {
@@ -176,6 +181,9 @@ impl<'a> Analysis<'a> {
                 continue;
             };
             self.step(start, instruction, place, &stack, &mut depth, &mut left);
+        }
+        if let Some(told) = image.told.get(&start).copied().filter(|told| *told > depth.own) {
+            self.flaw(start, start, FlawKind::SmallerThanTold { found: depth.own, told });
         }
         depth.worst = depth.worst.max(depth.own);
         depth
@@ -344,6 +352,7 @@ mod tests {
         Image {
             functions: BTreeMap::from(functions),
             code: Code::disassemble(&[(0, &bytes)], &marks).unwrap(),
+            told: BTreeMap::from([(0, 24), (0xc, 28), (0x4c, 73)]),
             detector_bytes: None,
             allocators: Vec::new(),
         }
@@ -372,7 +381,12 @@ mod tests {
 
     #[test]
     fn a_table_leads_to_all_of_its_places() {
-        assert_eq!(found("table"), (8 + 64, 72, vec![]));
+        assert_eq!((found("table").0, found("table").1), (8 + 64, 72));
+    }
+
+    #[test]
+    fn a_frame_that_the_compiler_says_is_larger_is_told() {
+        assert_eq!(found("table").2, ["frame of unknown size in table: 72 bytes by its code, 73 by the compiler"]);
     }
 
     #[test]

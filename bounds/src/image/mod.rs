@@ -26,6 +26,8 @@ pub(crate) struct Function {
 pub(crate) struct Image {
     functions: BTreeMap<u32, Function>,
     code: code::Code,
+    /// Frames as the compiler tells them, by function; empty if it was not asked to.
+    told: BTreeMap<u32, u32>,
     /// Bytes of the symbol `DETECTOR`.
     pub(crate) detector_bytes: Option<u64>,
     /// Names that an allocator would have.
@@ -84,7 +86,11 @@ impl Image {
         }
         end_by_the_next(&mut functions, &sections);
         let code = code::Code::disassemble(&sections, &marks)?;
-        Ok(Self { functions, code, detector_bytes, allocators })
+        let told = match file.section_by_name(".stack_sizes") {
+            Some(section) => told_frames(section.data().context("the sizes of the frames cannot be read")?)?,
+            None => BTreeMap::new(),
+        };
+        Ok(Self { functions, code, told, detector_bytes, allocators })
     }
 
     /// Addresses of the entries, by name.
@@ -99,6 +105,27 @@ impl Image {
     pub(crate) fn name(&self, address: u32) -> &str {
         self.functions.get(&address).map_or("?", |function| &function.name)
     }
+}
+
+/// The section that the compiler writes: an address, and a number in LEB128, for each function.
+fn told_frames(mut bytes: &[u8]) -> Result<BTreeMap<u32, u32>> {
+    let mut told = BTreeMap::new();
+    while let Some((address, mut rest)) = bytes.split_first_chunk::<4>() {
+        let (mut size, mut shift) = (0u64, 0u32);
+        loop {
+            let Some((&byte, after)) = rest.split_first().filter(|_| shift < 63) else {
+                bail!("the sizes of the frames end in the middle of a number");
+            };
+            size |= u64::from(byte & 0x7f) << shift;
+            (rest, shift) = (after, shift + 7);
+            if byte & 0x80 == 0 {
+                break;
+            }
+        }
+        told.insert(u32::from_le_bytes(*address) & !1, u32::try_from(size).unwrap_or(u32::MAX));
+        bytes = rest;
+    }
+    Ok(told)
 }
 
 /// A function without a size, as assembly may have them, ends where the next one begins.
@@ -123,4 +150,23 @@ fn is_allocator(name: &str) -> bool {
     ["__rust_alloc", "__rust_realloc", "__rust_dealloc", "__rg_alloc", "malloc", "calloc", "realloc", "free", "_sbrk"]
         .iter()
         .any(|allocator| plain == *allocator || plain.ends_with(&format!("::{allocator}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_the_compiler_tells_are_read() {
+        let section = [0x01, 0x80, 0, 0, 0xb0, 0x09, 0x11, 0x80, 0, 0, 0x08];
+        assert_eq!(told_frames(&section).unwrap(), BTreeMap::from([(0x8000, 1200), (0x8010, 8)]));
+        assert!(told_frames(&section[..5]).is_err());
+        assert!(told_frames(&[]).unwrap().is_empty());
+    }
+
+    #[test]
+    fn allocators_are_known_by_name() {
+        assert!(["malloc", "__rust_alloc", "_sbrk"].into_iter().all(is_allocator));
+        assert!(!["entry_wire_frame", "memcpy", "mallocate"].into_iter().any(is_allocator));
+    }
 }
