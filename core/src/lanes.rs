@@ -26,7 +26,7 @@ mod tests {
     fn whole_numbers_are_those_of_the_language() {
         let mut random = Random::seeded("floor", 0x5eed_0207);
         let plain = |x: f32, least: f32, most: f32| x.clamp(least, most).floor() as i32;
-        let mut check = |x: f32| {
+        let check = |x: f32| {
             for (least, most) in [(-32768.0, 32767.0), (0.0, 255.0), (0.0, 39.0)] {
                 assert_eq!(floor(x, least, most), plain(x, least, most), "{x} in {least}..={most}");
             }
