@@ -106,12 +106,10 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
     }
 }
 
-/// Where the rays of a row of a tile begin, and what they have in common.
+/// The rays of a row of a tile.
 struct Row {
-    /// Direction of the first ray, and how fast it climbs above the plane.
-    direction: [f32; 3],
-    climb: f32,
-    climb_step: f32,
+    /// Directions along x, y and z, and how fast they climb above the plane: each is the one before and a step.
+    rays: [[f32; TILE]; 4],
     camera_height_m: f32,
 }
 
@@ -135,12 +133,15 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
         let plane = self.ground.plane();
         let rise = |d: [f32; 3]| d[0] * plane.normal[0] + d[1] * plane.normal[1] + d[2] * plane.normal[2];
         let direction = rays.direction(x0 as f32, y as f32);
-        let row = Row {
-            direction,
-            climb: rise(direction),
-            climb_step: rise(rays.along_row),
-            camera_height_m: plane.height_m(rays.origin_m),
-        };
+        let ([x, y, z], [dx, dy, dz]) = (direction, rays.along_row);
+        let (mut now, steps) = ([x, y, z, rise(direction)], [dx, dy, dz, rise(rays.along_row)]);
+        let mut row = Row { rays: [[0.0; TILE]; 4], camera_height_m: plane.height_m(rays.origin_m) };
+        for k in 0..TILE {
+            for ((ray, now), step) in row.rays.iter_mut().zip(&mut now).zip(steps) {
+                ray[k] = *now;
+                *now += step;
+            }
+        }
         let mut noise_per_m2 = [0.0; TILE];
         let roles = self.spread(&labels, &row, &mut noise_per_m2);
         let (mut keys, mut heights_dm) = ([0; TILE], [0; TILE]);
@@ -173,8 +174,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
                 Role::Obstacle => roles.obstacle |= run,
                 Role::Other => {}
             }
-            let step = self.view.rays.along_row;
-            let at = |i: usize| row.direction[i] + first as f32 * step[i];
+            let at = |i: usize| row.rays[i].get(first as usize).copied().unwrap_or(0.0);
             let [nx, ny, nz] = common.across;
             let drop = at(0) * nx + at(1) * ny + at(2) * nz;
             let noise = self.settings.height_noise_px * drop.abs() / focal_baseline_px_m;
@@ -201,18 +201,22 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             return;
         };
         let [known, is_ground, is_obstacle] = [roles.any, roles.ground, roles.obstacle].map(|bits| bits >> first);
+        let [ray_x, ray_y, _, climb] = &row.rays;
+        let (Some(ray_x), Some(ray_y), Some(climb)) = (group(ray_x, first), group(ray_y, first), group(climb, first))
+        else {
+            return;
+        };
         let view = self.view;
         let MapGeometry { x_first, x_count, y_first, y_count, .. } = self.settings.geometry;
         let per_cell = 1.0 / self.settings.geometry.cell_size_m();
         let z = view.depth.distances_m(pixels);
-        let (origin, step) = (view.rays.origin_m, view.rays.along_row);
+        let origin = view.rays.origin_m;
         let (mut x, mut y, mut above_plane) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         let (mut cells, mut any) = ([0; LANES], 0);
         for k in 0..LANES {
-            let along = (first + k) as i32 as f32;
-            x[k] = origin[0] + z[k] * (row.direction[0] + along * step[0]);
-            y[k] = origin[1] + z[k] * (row.direction[1] + along * step[1]);
-            above_plane[k] = row.camera_height_m + z[k] * (row.climb + along * row.climb_step);
+            x[k] = origin[0] + z[k] * ray_x[k];
+            y[k] = origin[1] + z[k] * ray_y[k];
+            above_plane[k] = row.camera_height_m + z[k] * climb[k];
             let [ahead, aside] = view.place.to_vehicle([x[k], y[k]]);
             let i = floor(ahead * per_cell, -32768.0, 32767.0).wrapping_sub(i32::from(x_first));
             let j = floor(aside * per_cell, -32768.0, 32767.0).wrapping_sub(i32::from(y_first));
