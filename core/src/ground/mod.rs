@@ -215,7 +215,7 @@ impl GroundFinder {
         frame: &VehicleFrame,
         height: Height,
     ) -> Option<GroundPlane> {
-        let noise = self.noise(table.iter().filter(|surface| self.tells_plane(surface, height)));
+        let noise = self.noise(table, height);
         let mut best: Option<(f32, GroundPlane)> = None;
         let mut attempt = |seed: Option<GroundPlane>| {
             let grown = seed.and_then(|seed| self.grow(seed, table, frame, height, &noise));
@@ -302,23 +302,25 @@ impl GroundFinder {
         Scatter { weight, covariance, ..surface.points }
     }
 
-    /// What `surfaces` say of the error of a disparity: the quadratic mean over how far their points lie off their planes, because it
-    /// is squares that the spread of the ground is made of.
-    fn noise<'a>(&self, surfaces: impl Iterator<Item = &'a Surface>) -> Noise {
+    /// What surfaces that tell of the plane say of the error of a disparity: the quadratic mean over how far their points lie off
+    /// their planes, because it is squares that the spread of the ground is made of. What is much rougher than that in the mean is
+    /// left out of it.
+    fn noise(&self, table: &[Surface], height: Height) -> Noise {
         let camera_m = self.frame.map_or([0.0; 3], |frame| frame.point([0.0; 3]));
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for surface in surfaces {
-            if let Some(shift_per_m) = shift_per_m(surface, camera_m) {
-                sum += surface.points.weight * shift_per_m * shift_per_m;
-                weight += surface.points.weight;
+        let mean = |most_per_m: f32| {
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for surface in table.iter().filter(|surface| self.tells_plane(surface, height)) {
+                let shift_per_m = shift_per_m(surface, camera_m).filter(|&shift_per_m| shift_per_m <= most_per_m);
+                if let Some(shift_per_m) = shift_per_m {
+                    sum += surface.points.weight * shift_per_m * shift_per_m;
+                    weight += surface.points.weight;
+                }
             }
-        }
-        let shift_per_m = if weight > 0.0 { libm::sqrtf(sum / weight) } else { 0.0 };
-        Noise {
-            camera_m,
-            most_per_m: self.settings.fit_roughness * shift_per_m,
-            shift_per_m: shift_per_m.min(self.most_noise_per_m),
-        }
+            if weight > 0.0 { libm::sqrtf(sum / weight) } else { 0.0 }
+        };
+        let most_per_m = self.settings.fit_roughness * mean(f32::INFINITY);
+        let shift_per_m = self.settings.fit_noise_factor * mean(most_per_m);
+        Noise { camera_m, most_per_m, shift_per_m: shift_per_m.min(self.most_noise_per_m) }
     }
 
     fn lies_on(&self, plane: &GroundPlane, surface: &Surface) -> bool {

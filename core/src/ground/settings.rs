@@ -15,9 +15,12 @@ pub struct GroundSettings {
     /// and verges would tilt it.
     pub fit_tolerance_m: f32,
     /// The error of a disparity moves a point along its ray, down when it moves away, and would tilt the plane away from the camera:
-    /// as much of it as the surfaces' points lie off their planes is taken out of their spread, and never more than this, px: points
-    /// lie off their planes for other reasons, too.
+    /// it is taken out of their spread, as far as they show it, and never more than this, px: points lie off their planes for other
+    /// reasons, too.
     pub fit_noise_max_px: f32,
+    /// How much larger the error of a disparity is than the surfaces' points show, because their own planes follow it: this many
+    /// times as much as they lie off their planes is taken out.
+    pub fit_noise_factor: f32,
     /// A surface whose points lie this many times as far off its plane as those of the surfaces in the mean has something else on it,
     /// as the foot of a wall: it has no say in the plane.
     pub fit_roughness: f32,
@@ -53,6 +56,7 @@ impl GroundSettings {
         height_tolerance_m: 0.0,
         fit_tolerance_m: 0.0,
         fit_noise_max_px: 0.0,
+        fit_noise_factor: 0.0,
         fit_roughness: 0.0,
         surface_tolerance_m: 0.0,
         surface_tolerance_per_m: 0.0,
@@ -76,6 +80,7 @@ impl GroundSettings {
         ConfigError::check("ground.height_tolerance_m", self.height_tolerance_m, 0.0, 20.0)?;
         ConfigError::check("ground.fit_tolerance_m", self.fit_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.fit_noise_max_px", self.fit_noise_max_px, 0.0, 4.0)?;
+        ConfigError::check("ground.fit_noise_factor", self.fit_noise_factor, 0.0, 10.0)?;
         ConfigError::check("ground.fit_roughness", self.fit_roughness, 1.0, 1000.0)?;
         ConfigError::check("ground.surface_tolerance_m", self.surface_tolerance_m, 0.001, 2.0)?;
         ConfigError::check("ground.surface_tolerance_per_m", self.surface_tolerance_per_m, 0.0, 0.5)?;
@@ -98,6 +103,7 @@ impl Default for GroundSettings {
             height_tolerance_m: 0.5,
             fit_tolerance_m: 0.05,
             fit_noise_max_px: 0.7,
+            fit_noise_factor: 1.5,
             fit_roughness: 1.5,
             surface_tolerance_m: 0.06,
             surface_tolerance_per_m: 0.01,
