@@ -21,10 +21,11 @@ const SLOPE_STEP_M: f32 = 1.5;
 /// What the pixels of a surface count as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
+    /// The first: a detector of zeros takes no room in the image of a program.
+    Other,
     /// Ground, and what may stand on it in the same tile: each pixel speaks for itself.
     Ground,
     Obstacle,
-    Other,
 }
 
 /// The roles of the pixels of a row of a tile, the first pixel in the lowest bit.
