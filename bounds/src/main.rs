@@ -6,6 +6,7 @@ mod bus;
 mod figures;
 mod image;
 mod memory;
+mod painted;
 mod report;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -37,6 +38,16 @@ enum Command {
         /// The budget.
         #[arg(long, default_value = "bounds/budget.toml")]
         budget: PathBuf,
+    },
+    /// Compares the stack that an image was seen to take with what its code can take; the exit status is 1 if it took more, or too
+    /// little for the bound to say much.
+    Painted {
+        /// The image; functions whose names begin with `entry_` are bounded.
+        #[arg(long)]
+        image: PathBuf,
+        /// What it printed, with lines `stack NAME BYTES`.
+        #[arg(long)]
+        said: PathBuf,
     },
     /// Prints a budget that is what is found now.
     Budget {
@@ -84,6 +95,11 @@ fn run(cli: &Cli) -> Result<bool> {
             let findings = budget.compare(&of(images)?);
             print!("{findings}");
             Ok(findings.are_good())
+        }
+        Command::Painted { image, said } => {
+            let painted = painted::Painted::of(image, said)?;
+            print!("{painted}");
+            Ok(painted.is_good())
         }
         Command::Budget { images, budget } => {
             let limits = budget::Budget::read(budget)?.limits;

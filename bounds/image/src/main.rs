@@ -92,7 +92,7 @@ impl Robot {
     fn run(&mut self, case: &Case<'_>, backend: Backend) {
         // Counters of messages go on from scan to scan: every run begins with those of a node that has just started.
         *self.encoder = ScanEncoder::new(robot::WIRE).ok();
-        let (configured, depth) = stack::depth_of(|| fencepost_configure(self.detector, &case.setup, backend));
+        let (configured, depth) = stack::depth_of(|| entry_configure(self.detector, &case.setup, backend));
         if let Err(error) = configured {
             hprintln!("{}", error);
             fail("the case cannot be configured");
@@ -118,7 +118,7 @@ impl Robot {
         };
         let clock = &mut self.clock;
         clock.begin();
-        let (detected, depth) = stack::depth_of(|| fencepost_detect(self.detector, &[left, right], clock));
+        let (detected, depth) = stack::depth_of(|| entry_detect(self.detector, &[left, right], clock));
         if detected.is_err() {
             fail("the pictures have another size than the cameras");
         }
@@ -132,7 +132,7 @@ impl Robot {
         let Some(encoder) = self.encoder else { fail("the wire cannot be configured") };
         let detection = self.detector.detection();
         let frames = self.frames.as_mut_view();
-        let (encoded, depth) = stack::depth_of(|| fencepost_encode(encoder, detection, scan_index, frames));
+        let (encoded, depth) = stack::depth_of(|| entry_encode(encoder, detection, scan_index, frames));
         let Some(encode) = self.clock.instructions().last().copied() else { fail("nothing is counted") };
         if encoded.is_err() {
             fail("there is no room for the scan");
@@ -157,13 +157,13 @@ fn send(id: StandardId, data: &[u8]) {
 /// The entries whose stack is measured and bounded; by name in the image, so that tools find them.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn fencepost_configure(detector: &mut RobotDetector, setup: &Setup, backend: Backend) -> Result<(), ConfigError> {
+fn entry_configure(detector: &mut RobotDetector, setup: &Setup, backend: Backend) -> Result<(), ConfigError> {
     robot::configure(detector, setup, backend)
 }
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn fencepost_detect(
+fn entry_detect(
     detector: &mut RobotDetector,
     pictures: &[Picture<'_>; 2],
     clock: &mut Clock,
@@ -175,7 +175,7 @@ fn fencepost_detect(
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn fencepost_encode(
+fn entry_encode(
     encoder: &mut ScanEncoder<RUNS>,
     detection: &RobotDetection,
     scan_index: u16,

@@ -288,22 +288,21 @@ impl<'a> Analysis<'a> {
         self.image.functions.get(&start).is_some_and(|function| (start..function.end).contains(&target))
     }
 
-    /// Where a table of jumps leads: half the distances from its start, in bytes or half words. It ends where code goes on.
+    /// Where a table of jumps leads: half the distances from its start, in bytes or half words. It ends where code goes on, or before
+    /// that with what leads to no code: padding, and constants behind the table. A constant that happens to lead to code is followed
+    /// as well, which can only add to the bound.
     fn table(&self, start: u32, instruction: &Instruction, is_wide: bool) -> Option<Vec<u32>> {
         let from = instruction.next();
         let bytes = self.image.code.table_at(from)?;
-        let mut distances: Vec<u32> = if is_wide {
+        let distances: Vec<u32> = if is_wide {
             bytes.chunks_exact(2).map(|pair| u32::from(pair[0]) | u32::from(pair[1]) << 8).collect()
         } else {
             bytes.iter().map(|byte| u32::from(*byte)).collect()
         };
-        // A table of bytes is filled up to whole half words.
-        if !is_wide && distances.last() == Some(&0) {
-            distances.pop();
-        }
-        let targets = distances.into_iter().map(|distance| from + 2 * distance).collect::<Vec<_>>();
-        let are_known = targets.iter().all(|target| self.is_inside(start, *target));
-        (are_known && !targets.is_empty()).then_some(targets)
+        let targets = distances.into_iter().map(|distance| from + 2 * distance);
+        let is_code = |target: &u32| self.is_inside(start, *target) && self.image.code.at(*target).is_some();
+        let targets = targets.take_while(is_code).collect::<Vec<_>>();
+        (!targets.is_empty()).then_some(targets)
     }
 }
 
