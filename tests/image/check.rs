@@ -44,6 +44,7 @@ pub(super) fn check(cases: &Path, said: &Path, image: &Path) -> Result<(), Strin
     println!("{}", table(&said));
     wrong.extend(memory(&said, &read(image)?)?);
     wrong.extend(counts::check(&said)?);
+    wrong.extend(counts::worst(&said));
     if wrong.is_empty() { Ok(()) } else { Err(wrong.join("\n")) }
 }
 

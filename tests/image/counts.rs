@@ -4,13 +4,49 @@ use std::{env, fs, path::PathBuf};
 
 use fencepost_tests::at_hand::ROOT;
 
-use super::{check::most, said::Said};
+use super::{
+    check::most,
+    said::{Run, Said},
+};
 
 /// Cases that every clone has.
 const CASES: [&str; 2] = ["trail", "trail-raw"];
 
 /// What may differ, of 100: more than that, either way, is worth a look.
 const TOLERANCE: u64 = 3;
+
+/// Pictures that are made to cost much.
+const HURTING: [&str; 6] = ["noise", "stripes", "checkerboard", "flat", "one-surface", "exchanged"];
+
+/// What they are held against: an ordinary street, or where recordings are not at hand the trail.
+const ORDINARY: [&str; 2] = ["kitti-urban", "trail"];
+
+/// Most that a frame made to cost much may take, of 100 that an ordinary one takes.
+const WORST: u64 = 130;
+
+/// Which of the pictures made to cost much cost too much.
+pub(super) fn worst(said: &Said) -> Vec<String> {
+    let total = |run: &Run| most(run).last().map_or(0, |(_, instructions)| *instructions);
+    let of = |case: &'static str| said.runs.iter().filter(move |run| run.case == case);
+    let ordinary = ORDINARY.into_iter().find(|case| of(case).next().is_some()).unwrap_or(ORDINARY[1]);
+    let mut wrong = Vec::new();
+    for typical in of(ordinary) {
+        let same = HURTING.into_iter().flat_map(of).filter(|run| run.backend == typical.backend);
+        let Some(hardest) = same.max_by_key(|run| total(run)) else {
+            wrong.push(format!("{}: no pictures that are made to cost much", typical.backend));
+            continue;
+        };
+        let percent = 100 * total(hardest) / total(typical).max(1);
+        println!("{}: the hardest frame, {}, takes {percent} % of {ordinary}", typical.backend, hardest.case);
+        if percent > WORST {
+            wrong.push(format!(
+                "{}: {} takes {percent} % of {ordinary}, at most {WORST}",
+                typical.backend, hardest.case
+            ));
+        }
+    }
+    wrong
+}
 
 /// What differs from `bounds/image/instructions.golden`; with `BLESS=1` it is written anew.
 pub(super) fn check(said: &Said) -> Result<Vec<String>, String> {
