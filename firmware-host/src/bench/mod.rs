@@ -25,7 +25,7 @@ pub struct Report {
     pub size: (u32, u32),
     /// Disparities searched.
     pub disparities: u16,
-    /// Which instructions the matching uses.
+    /// Whose instructions the matching used.
     pub backend: Backend,
     /// The times.
     pub measurement: Measurement,
