@@ -19,12 +19,12 @@ pub(super) fn take_out<const CELLS: usize>(map: &mut ObstacleMap<CELLS>, place: 
         let (i, j) = geometry.cell_at(index);
         let [x, y] = place.to_pair(geometry.centre_m(i, j).into());
         let fewest = f32::from(cell.pixels) / settings.smear_share.max(f32::MIN_POSITIVE);
-        // Where the line of sight passes, to both sides of its middle: it may run along the border of two cells, and a thing that
-        // stands there has its pixels in both.
+        // Where the lines of sight to both sides of the cell pass: they may lie to either side of the border of two cells, and a thing
+        // that stands on it has its pixels in both.
         let smears = (1..=settings.smear_cells).any(|back| {
             let part = 1.0 - f32::from(back) * size / x.max(size);
             let [ahead, aside] = place.to_vehicle([x * part, y * part]);
-            let [right, left] = [-0.25, 0.25].map(|side| geometry.index_at(ahead, aside + side * size));
+            let [right, left] = [-0.5, 0.5].map(|side| geometry.index_at(ahead, aside + side * part * size));
             let pixels = |before: Option<usize>| {
                 let before = before.filter(|&before| before != index).and_then(|before| map.cells.get(before));
                 before
