@@ -150,9 +150,10 @@ struct Reached {
     most_false: usize,
 }
 
+// The thing that is not found stands behind a post, which leaves strips of it that are narrower than the matching window.
 const ON_SLOPES: Reached = Reached { most_missed: 1, most_false: 0 };
-const BEFORE_SLOPES: Reached = Reached { most_missed: 0, most_false: 6 };
-const CRESTS_AND_DIPS: Reached = Reached { most_missed: 0, most_false: 2 };
+const BEFORE_SLOPES: Reached = Reached { most_missed: 0, most_false: 1 };
+const CRESTS_AND_DIPS: Reached = Reached { most_missed: 0, most_false: 0 };
 
 /// Crates and posts. One frame of each: there are many slopes, and a detector that has just been started must not fail.
 fn course() -> SceneOptions {

@@ -12,7 +12,8 @@ pub struct MapSettings {
     /// A cell is an obstacle if obstacle pixels cover at least this part of the area that a cell-wide piece of the least
     /// height of an obstacle takes in the picture at the distance of the cell.
     pub obstacle_cover: f32,
-    /// ... and never fewer pixels than this.
+    /// ... and never fewer pixels than this: half of a matching window, which is what a false match of the sky makes of each of two
+    /// cells that it falls on.
     pub obstacle_min_pixels: u16,
     /// A cell is free if at least this part of the area that its piece of ground takes in the picture was seen as ground.
     pub free_cover: f32,
@@ -26,7 +27,7 @@ pub struct MapSettings {
     /// How much a pixel counts for an obstacle that is too high for the ground but lies on a surface that is none, such as the top of
     /// a thing: many of them are one, a few are not.
     pub unclear_share: f32,
-    /// An obstacle cell with less than this share of the pixels of one nearer in the same direction is what the matching window
+    /// An obstacle cell with less than this share of the pixels that lie nearer in the same direction is what the matching window
     /// smears of that; 0 for never.
     pub smear_share: f32,
     /// How many cells behind an obstacle it smears, at most 8.
@@ -89,7 +90,7 @@ impl Default for MapSettings {
         Self {
             geometry: MapGeometry::default(),
             obstacle_cover: 0.1,
-            obstacle_min_pixels: 24,
+            obstacle_min_pixels: 32,
             free_cover: 0.03,
             free_min_pixels: 4,
             free_max_height_m: 0.2,

@@ -3,7 +3,7 @@
 use super::{Cell, CellState, MapSettings, ObstacleMap, UnknownReason};
 use crate::geometry::Place;
 
-/// Takes out obstacle cells that have few pixels beside an obstacle cell nearer to the pair at `place` in the same direction.
+/// Takes out obstacle cells that have few pixels beside the obstacle cells nearer to the pair at `place` in the same direction.
 ///
 /// Beside the edge of a thing the window sees the thing and what lies behind it, and finds a disparity between the two: a few
 /// pixels of each obstacle come to lie behind it. What hides behind an obstacle, they cannot tell.
@@ -19,15 +19,20 @@ pub(super) fn take_out<const CELLS: usize>(map: &mut ObstacleMap<CELLS>, place: 
         let (i, j) = geometry.cell_at(index);
         let [x, y] = place.to_pair(geometry.centre_m(i, j).into());
         let fewest = f32::from(cell.pixels) / settings.smear_share.max(f32::MIN_POSITIVE);
-        // Where the line of sight passes, to both sides of its middle: it may run along the border of two cells.
+        // Where the lines of sight to both sides of the cell pass: they may lie to either side of the border of two cells, and a thing
+        // that stands on it has its pixels in both.
         let smears = (1..=settings.smear_cells).any(|back| {
             let part = 1.0 - f32::from(back) * size / x.max(size);
             let [ahead, aside] = place.to_vehicle([x * part, y * part]);
-            [-0.25, 0.25].into_iter().any(|side| {
-                let before = geometry.index_at(ahead, aside + side * size).filter(|&before| before != index);
-                let before = before.and_then(|before| map.cells.get(before));
-                before.is_some_and(|before| before.state == CellState::Obstacle && f32::from(before.pixels) >= fewest)
-            })
+            let [right, left] = [-0.5, 0.5].map(|side| geometry.index_at(ahead, aside + side * part * size));
+            let pixels = |before: Option<usize>| {
+                let before = before.filter(|&before| before != index).and_then(|before| map.cells.get(before));
+                before
+                    .filter(|before| before.state == CellState::Obstacle)
+                    .map_or(0.0, |before| f32::from(before.pixels))
+            };
+            let before = pixels(right) + if left == right { 0.0 } else { pixels(left) };
+            before > 0.0 && before >= fewest
         });
         if let Some(cell) = map.cells.get_mut(index).filter(|_| smears) {
             *cell = Cell { state: CellState::Unknown(UnknownReason::Hidden), cost: cell.cost, ..Cell::default() };

@@ -5,7 +5,7 @@ use std::{boxed::Box, vec, vec::Vec};
 use super::*;
 use crate::{
     disparity::{DisparityPicture, DisparityPixel, Reason},
-    geometry::Place,
+    geometry::{Mount, Place},
     ground::{GroundPlane, GroundSettings},
     obstacles::ObstacleSettings,
     surfaces::{Surface, SurfaceClass, TILE},
@@ -540,6 +540,28 @@ fn obstacles_smear_cells_with_few_pixels_right_behind_them() {
         let never = MapSettings { smear_share: 0.0, ..settings };
         assert_eq!(left_over(j, &[(1, 1)], &never), [true], "{j}");
     }
+}
+
+#[test]
+fn a_thing_on_the_border_of_two_cells_smears_with_the_pixels_of_both() {
+    let settings = MapSettings::default();
+    let geometry = MapGeometry { cell_size_mm: 500, x_first: 0, x_count: 40, y_first: -20, y_count: 40 };
+    // Seen from five metres to the right, the line of sight to the last cell passes the border between the two before it.
+    let place = Place::new(&Mount { left_m: -5.0, ..Mount::default() });
+    let stays = |left: u16, right: u16| {
+        let mut map = ObstacleMap::<CELLS> { geometry, cells: heapless::Vec::new() };
+        for _ in 0..geometry.len() {
+            map.cells.push(Cell::default()).unwrap();
+        }
+        for (i, j, pixels) in [(20, 0, left), (20, -1, right), (21, 0, 120)] {
+            let cell = &mut map.cells[geometry.index(i, j).unwrap()];
+            *cell = Cell { state: CellState::Obstacle, pixels, ..Cell::default() };
+        }
+        smear::take_out(&mut map, &place, &settings);
+        map.cells[geometry.index(21, 0).unwrap()].state == CellState::Obstacle
+    };
+    assert!(stays(200, 0) && stays(0, 200), "either by itself is too little");
+    assert!(!stays(200, 200), "both together are enough");
 }
 
 #[test]
