@@ -13,8 +13,9 @@
 //!                                        └─> a plane each ─> ground ─> obstacles ─> map (core)
 //! ```
 //!
-//! It takes seconds for a picture and memory from the heap, so it is not in the core and nothing drives by it. The eigenvectors,
-//! the smallest of a sparse matrix of tens of thousands of rows, are found in small subspaces, whose matrices `nalgebra` solves.
+//! It takes seconds for a picture and memory from the heap, so it is not in the core and nothing drives by it. The eigenvectors
+//! are those of `faer`'s Krylov-Schur solver: the smallest pairs of a sparse matrix of tens of thousands of rows, and no
+//! compiler but Rust's.
 
 mod cut;
 mod eigen;
