@@ -88,8 +88,9 @@ impl CostMap {
         map: &mut MapBuilder<CELLS>,
     ) -> Option<GroundPlane> {
         self.measure(picture, view, map);
-        let flat = map.table().iter().filter(|slot| self.is_flat(Column::of(slot))).count();
-        if flat < usize::from(self.settings.min_columns) {
+        let mut flat = map.table().iter().filter(|slot| self.is_flat(Column::of(slot)));
+        let least = usize::from(self.settings.min_columns);
+        if least > 0 && flat.nth(least.wrapping_sub(1)).is_none() {
             return None;
         }
         let mut sums = PointSums::default();
@@ -161,7 +162,7 @@ impl CostMap {
         for_each_point(picture, view, map, |slot, point| {
             let column = Column::of(slot);
             if column.points < u16::MAX {
-                let sum = column.sum.saturating_add((height_mm(point) - LOWEST_MM as i32).unsigned_abs());
+                let sum = column.sum.saturating_add(height_mm(point).abs_diff(LOWEST_MM as i32));
                 Column { points: column.points + 1, sum, ..column }.put(slot);
             }
         });

@@ -87,7 +87,9 @@ impl GroundDeviation {
         self.pair = Some((*pair, *frame));
         self.height_known = height_known;
         let (width, height) = (pair.width as usize, pair.height as usize);
-        let along = |length: usize, stride: &usize| length.div_ceil((*stride).max(1));
+        let along = |length: usize, stride: &usize| {
+            (length / (*stride).max(1)).saturating_add(usize::from(!length.is_multiple_of(*stride)))
+        };
         let fits = |stride: &usize| {
             along(width, stride).saturating_mul(along(height, stride)) <= usize::from(settings.samples)
         };
@@ -145,8 +147,8 @@ impl GroundDeviation {
         }
         let (samples, squares) = found?;
         let (normal, camera_height_m) = self.plausible(&plane)?;
-        let support = u32::try_from(samples).unwrap_or(u32::MAX).saturating_mul((self.stride * self.stride) as u32);
-        let pixels = (pair.width as usize * pair.height as usize) as f32;
+        let support = u32::try_from(samples).unwrap_or(u32::MAX).saturating_mul(self.stride.saturating_mul(self.stride) as u32);
+        let pixels = (pair.width as usize).saturating_mul(pair.height as usize) as f32;
         if (support as f32) < self.ground.min_support_permille * 1.0e-3 * pixels {
             return None;
         }

@@ -47,7 +47,8 @@ impl PointSums {
         }
         let d: [f32; 3] = core::array::from_fn(|i| point[i] - self.first[i]);
         let products = [d[0] * d[0], d[0] * d[1], d[0] * d[2], d[1] * d[1], d[1] * d[2], d[2] * d[2]];
-        self.count += 1;
+        // At most `RUN`: then it begins anew.
+        self.count = self.count.wrapping_add(1);
         self.sum.iter_mut().zip(d).for_each(|(sum, d)| *sum += d);
         self.products.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
         if self.count == RUN {
