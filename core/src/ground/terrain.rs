@@ -113,15 +113,14 @@ impl Terrain {
             self.begin();
             for y in (0..height).rev().step_by(STEP_Y) {
                 let (row, labels) = (picture.row(y), surfaces.labels_row(y));
-                let tiles = row.chunks(TILE).zip(labels.chunks(TILE));
-                for (x0, (pixels, labels)) in (0..row.len()).step_by(TILE).zip(tiles) {
+                for x0 in (0..row.len()).step_by(TILE) {
                     let table = surfaces.of_tile(x0, y);
                     if table.is_empty() {
                         continue;
                     }
-                    let groups = pixels.chunks(STEP_X).zip(labels.chunks(STEP_X));
-                    for (x, (pixels, labels)) in (x0..row.len()).step_by(STEP_X).zip(groups) {
-                        let (Some(pixel), Some(&label)) = (pixels.first(), labels.first()) else { continue };
+                    let end = x0.saturating_add(TILE).min(row.len());
+                    for x in (x0..end).step_by(STEP_X) {
+                        let (Some(pixel), Some(&label)) = (row.get(x), labels.get(x)) else { break };
                         let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(i));
                         let Some(surface) = surface.filter(|surface| surface.class != SurfaceClass::Vertical) else {
                             continue;

@@ -116,7 +116,9 @@ impl CostMap {
         let CostMapSettings { min_height_m, max_height_m, .. } = self.settings;
         map.begin();
         codes.fill(OTHER);
-        for (y, codes) in (0..picture.height()).zip(codes.chunks_exact_mut(picture.width().max(1))) {
+        let mut rows = codes.chunks_exact_mut(picture.width().max(1));
+        for y in 0..picture.height() {
+            let Some(codes) = rows.next() else { break };
             for (x, point) in row_points(picture, view.depth, view.rays, y) {
                 let height_m = ground.height_m(point);
                 let (code, vote) = match height_m {

@@ -106,7 +106,9 @@ impl<const WIDTH: usize> PixelNormals<WIDTH> {
         let (edge, percent) = (u64::from(self.settings.window), u64::from(self.settings.min_filled_percent));
         let least = (edge.wrapping_mul(edge).wrapping_mul(percent).wrapping_add(99) / 100).max(3) as i64;
         let most_squares = 256.0 * self.settings.max_rms_px * self.settings.max_rms_px;
-        for (y, codes) in (0..picture.height()).zip(codes.chunks_exact_mut(picture.width().max(1))) {
+        let mut rows = codes.chunks_exact_mut(picture.width().max(1));
+        for y in 0..picture.height() {
+            let Some(codes) = rows.next() else { break };
             move_columns(self.columns.get_mut(..width).unwrap_or_default(), y, radius, steps);
             let columns = self.columns.get(..width).unwrap_or_default();
             let row = picture.row(y).iter().zip(windows(columns, radius));

@@ -17,7 +17,8 @@ pub(super) fn row_points<'a, const DISPARITIES: usize>(
     y: usize,
 ) -> impl Iterator<Item = (usize, [f32; 3])> + 'a {
     let (start, step) = (rays.direction(0.0, y as f32), rays.along_row);
-    picture.row(y).iter().enumerate().filter_map(move |(x, pixel)| {
+    let row = picture.row(y);
+    (0..row.len()).zip(row).filter_map(move |(x, pixel)| {
         let z = depth.distance_m(pixel.steps());
         let along = |i: usize| rays.origin_m[i] + z * (start[i] + x as f32 * step[i]);
         (z > 0.0).then(|| (x, [along(0), along(1), along(2)]))

@@ -18,14 +18,8 @@ pub(super) struct ColumnSums {
 }
 
 impl ColumnSums {
-    pub(super) const ZERO: Self = Self {
-        n: Wrapping(0),
-        v: Wrapping(0),
-        vv: Wrapping(0),
-        d: Wrapping(0),
-        vd: Wrapping(0),
-        dd: Wrapping(0),
-    };
+    pub(super) const ZERO: Self =
+        Self { n: Wrapping(0), v: Wrapping(0), vv: Wrapping(0), d: Wrapping(0), vd: Wrapping(0), dd: Wrapping(0) };
 
     /// Counts rows from the next one on.
     fn move_down(&mut self) {
