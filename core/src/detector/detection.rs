@@ -121,7 +121,8 @@ impl Statistics {
 
     /// Share of the pixels that have a disparity.
     pub fn coverage(&self) -> f32 {
-        let all = self.pixels_without.iter().fold(self.pixels_with_disparity, |sum, pixels| sum.saturating_add(*pixels));
+        let all =
+            self.pixels_without.iter().fold(self.pixels_with_disparity, |sum, pixels| sum.saturating_add(*pixels));
         self.pixels_with_disparity as f32 / all.max(1) as f32
     }
 
