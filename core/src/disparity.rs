@@ -159,16 +159,19 @@ impl<'a> DisparityPicture<'a> {
         // In short pieces counts fit 16 bits, as wide as the pixels.
         for piece in self.pixels.chunks(4096) {
             let has_value = count(piece, |pixel| pixel.has_value());
-            with += has_value;
+            // No count exceeds that of the pixels of a picture, which is less than 2^32.
+            with = with.wrapping_add(has_value);
             let mut known = has_value;
             for (without, reason) in without.iter_mut().zip(Reason::ALL).skip(1) {
                 let said = count(piece, |pixel| pixel == DisparityPixel::none(reason));
-                *without += said;
-                known += said;
+                *without = without.wrapping_add(said);
+                known = known.wrapping_add(said);
             }
             let zero = count(piece, |pixel| pixel.bits() == 0);
-            without[Reason::OutOfRange as usize] += zero;
-            without[Reason::OutsideValidArea as usize] += (piece.len() as u32).saturating_sub(known + zero);
+            let outside = (piece.len() as u32).saturating_sub(known.wrapping_add(zero));
+            for (reason, said) in [(Reason::OutOfRange, zero), (Reason::OutsideValidArea, outside)] {
+                without[reason as usize] = without[reason as usize].wrapping_add(said);
+            }
         }
         (with, without)
     }

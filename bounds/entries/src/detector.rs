@@ -173,7 +173,8 @@ fn entry_surfaces_join(
     picture: DisparityPicture<'_>,
 ) -> usize {
     regions.join(surfaces, picture, |surface| surface.normal[2] > 0.5);
-    regions.roots().map(|root| regions.members(root).count()).max().unwrap_or(0)
+    let count = |root| regions.members(root).fold(0usize, |count, _| count.saturating_add(1));
+    regions.roots().map(count).max().unwrap_or(0)
 }
 
 #[unsafe(no_mangle)]

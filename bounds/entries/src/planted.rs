@@ -38,6 +38,21 @@ fn entry_planted_deep_stack(at: &[u8]) -> u8 {
     core::hint::black_box(&table).iter().fold(0, |sum, byte| sum ^ byte)
 }
 
+/// Memory from an allocator.
+#[cfg(feature = "plant-allocator")]
+#[unsafe(no_mangle)]
+fn entry_planted_allocator(size: usize) -> *mut u8 {
+    malloc(size)
+}
+
+/// Has nothing to give, but has the name.
+#[cfg(feature = "plant-allocator")]
+#[inline(never)]
+#[unsafe(no_mangle)]
+extern "C" fn malloc(size: usize) -> *mut u8 {
+    core::hint::black_box(core::ptr::without_provenance_mut(size))
+}
+
 // Stack by the size of the input, which the language itself does not offer.
 #[cfg(all(feature = "plant-unbounded-stack", target_arch = "arm"))]
 core::arch::global_asm!(

@@ -27,10 +27,13 @@ impl Sums {
     /// A step for each pixel, and for each column of the first window.
     #[inline(always)]
     pub(crate) fn make(&mut self, search: &Search, columns: &[u32]) {
-        let before = search.range.start.saturating_sub(search.radius + 1);
+        let before = search.leaving(search.range.start);
         let leaving = columns.get(before..).unwrap_or_default();
-        let entering = columns.get(search.range.start + search.radius..).unwrap_or_default();
-        let mut sum = leaving.iter().take(2 * search.radius + 1).fold(0u32, |sum, &column| sum.wrapping_add(column));
+        let entering = columns.get(search.entering(search.range.start)..).unwrap_or_default();
+        let mut sum = leaving
+            .iter()
+            .take(search.radius.saturating_mul(2).saturating_add(1))
+            .fold(0u32, |sum, &column| sum.wrapping_add(column));
         // What changes first, many at a time, so that only one addition waits for the one before.
         for ((out, &enter), &leave) in self.0.iter_mut().zip(entering).zip(leaving) {
             *out = enter.wrapping_sub(leave);
@@ -91,7 +94,7 @@ impl Decide {
         out: &mut [DisparityPixel],
         weak: &mut [bool],
     ) {
-        let top = (search.min_disparity + search.disparities - 1) as i32;
+        let top = search.top() as i32;
         let min_disparity = search.min_disparity as i32;
         let (right_first, right_end) = (search.right_first as i32, search.right_end as i32);
         let start = search.range.start as i32;
@@ -101,18 +104,19 @@ impl Decide {
         let (mut decided, mut untold) = ([0u16; CHUNK], [0u8; CHUNK]);
         // Arrays of one length and one step for each pixel: this becomes vector instructions.
         for i in 0..CHUNK {
-            let x = start + i as i32;
-            let largest = top.min(x - right_first);
-            let smallest = min_disparity.max(x + 1 - right_end);
+            // Columns, disparities and costs have 16 bits: what is made of them fits 32.
+            let x = start.wrapping_add(i as i32);
+            let largest = top.min(x.wrapping_sub(right_first));
+            let smallest = min_disparity.max(x.wrapping_add(1).wrapping_sub(right_end));
             let above = found.above[i];
             // The two places beside the best one do not count.
             let beside = 1 + u16::from(found.nearer[i] < above) + u16::from(found.farther[i] < above);
             let weak_here = found.weak[i] != 0;
             let unique = if weak_here { self.unique[1] } else { self.unique[0] };
             let ambiguous = unique & (found.near[i] > beside);
-            let disparity = top - i32::from(found.place[i]);
+            let disparity = top.wrapping_sub(i32::from(found.place[i]));
             let offset = refine(cost(found.farther[i]), cost(found.best[i]), cost(found.nearer[i]));
-            let steps = (16 * disparity + offset).max(0);
+            let steps = disparity.wrapping_mul(16).wrapping_add(offset).max(0);
             // As `DisparityPixel::from_steps`; steps are below 32768 because disparities are below 2048.
             let bits = if steps == 0 { none(Reason::OutOfRange) } else { steps };
             let bits = if ambiguous { none(Reason::NotUnique) } else { bits };
@@ -148,14 +152,15 @@ pub(crate) const NO_PARTNER: i16 = i16::MAX;
 #[inline(always)]
 pub(crate) fn back_check(tolerance: u16, first: usize, out: &mut [DisparityPixel], right: &[i16]) {
     let mismatch = DisparityPixel::none(Reason::LeftRightMismatch).bits();
-    for (start, out) in (first..).step_by(CHUNK).zip(out.chunks_mut(CHUNK)) {
+    let end = first.saturating_add(out.len());
+    for (start, out) in (first..end).step_by(CHUNK).zip(out.chunks_mut(CHUNK)) {
         let (mut disparities, mut back) = ([0u16; CHUNK], [0i16; CHUNK]);
         for (disparity, pixel) in disparities.iter_mut().zip(&*out) {
             // Rounding to the nearest pixel may be one off the place that was chosen: half a pixel is shared.
             *disparity = ((pixel.bits() & 0x7fff) + 8) >> 4;
         }
         // What is told here of pixels without a disparity does not matter.
-        for ((back, &disparity), x) in back.iter_mut().zip(&disparities).zip(start..) {
+        for ((back, &disparity), x) in back.iter_mut().zip(&disparities).zip(start..start.saturating_add(CHUNK)) {
             *back = right.get(x.wrapping_sub(usize::from(disparity))).copied().unwrap_or(NO_PARTNER);
         }
         for (pixel, (&disparity, &back)) in out.iter_mut().zip(disparities.iter().zip(&back)) {
@@ -171,18 +176,20 @@ pub(crate) fn back_check(tolerance: u16, first: usize, out: &mut [DisparityPixel
 /// The quotient is at most 8, so four steps of a division by hand find it: vectors have no integer division.
 #[inline(always)]
 pub(crate) fn refine(farther: i32, best: i32, nearer: i32) -> i32 {
-    let slope = farther.max(nearer) - best;
-    let difference = farther - nearer;
+    // Costs have 16 bits: what is made of them fits 32.
+    let slope = farther.max(nearer).wrapping_sub(best);
+    let difference = farther.wrapping_sub(nearer);
     // Rounds to the nearest, halves away from zero.
-    let mut rest = 8 * difference.abs() + slope / 2;
+    let mut rest = difference.wrapping_abs().wrapping_mul(8).wrapping_add(slope / 2);
     let mut quotient = 0;
     for bit in [8, 4, 2, 1] {
-        let fits = rest >= bit * slope;
-        rest -= if fits { bit * slope } else { 0 };
-        quotient += if fits { bit } else { 0 };
+        let times = slope.wrapping_mul(bit);
+        let fits = rest >= times;
+        rest = rest.wrapping_sub(if fits { times } else { 0 });
+        quotient |= if fits { bit } else { 0 };
     }
     let quotient = if slope <= 0 { 0 } else { quotient };
-    if difference < 0 { -quotient } else { quotient }
+    if difference < 0 { quotient.wrapping_neg() } else { quotient }
 }
 
 #[cfg(test)]

@@ -178,30 +178,63 @@ impl KeyLimits {
 /// The largest cost that is nearly as good as `cost`. No sum under a window exceeds 16 bits.
 #[inline(always)]
 fn limit(cost: u16, uniqueness_percent: u16) -> u32 {
-    u32::from(cost) * (100 + u32::from(uniqueness_percent)) / 100
+    u32::from(cost).saturating_mul(100 + u32::from(uniqueness_percent)) / 100
 }
 
 impl Search {
+    /// The disparity of place 0, the largest one.
+    #[inline(always)]
+    pub(crate) const fn top(&self) -> usize {
+        self.min_disparity.saturating_add(self.disparities).saturating_sub(1)
+    }
+
+    /// Columns under the window of the pixel before the first.
+    #[inline(always)]
+    pub(crate) fn window_before(&self) -> Range<usize> {
+        self.leaving(self.range.start)..self.entering(self.range.start)
+    }
+
+    /// The column that enters the window at left pixel `x`.
+    #[inline(always)]
+    pub(crate) const fn entering(&self, x: usize) -> usize {
+        x.saturating_add(self.radius)
+    }
+
+    /// The column that leaves the window at left pixel `x`.
+    #[inline(always)]
+    pub(crate) const fn leaving(&self, x: usize) -> usize {
+        x.saturating_sub(self.radius).saturating_sub(1)
+    }
+
+    /// The number of left pixel `x` in the chunk.
+    #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
+    #[inline(always)]
+    pub(crate) const fn nth(&self, x: usize) -> usize {
+        x.wrapping_sub(self.range.start)
+    }
+
     /// Places whose right window lies within the right picture, for left pixel `x`.
     #[inline(always)]
     pub(crate) fn candidates(&self, x: usize) -> Range<usize> {
-        let top = self.min_disparity + self.disparities - 1;
+        let top = self.top();
         let Some(reach) = x.checked_sub(self.right_first) else { return 0..0 };
         let largest = top.min(reach);
-        let smallest = self.min_disparity.max((x + 1).saturating_sub(self.right_end));
+        let smallest = self.min_disparity.max(x.saturating_add(1).saturating_sub(self.right_end));
         if largest < smallest || self.right_first >= self.right_end {
             return 0..0;
         }
-        top - largest..top - smallest + 1
+        // Neither is above the top.
+        top.wrapping_sub(largest)..top.wrapping_sub(smallest).wrapping_add(1)
     }
 
     /// Pixels that have all candidates, within `range`.
     #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"), dsp))]
     pub(crate) fn inner(&self) -> Range<usize> {
-        let first = self.right_first + self.min_disparity + self.disparities - 1;
-        let end = if self.right_first < self.right_end { self.right_end + self.min_disparity } else { 0 };
-        let first = first.clamp(self.range.start, self.range.end);
-        first..end.clamp(first, self.range.end)
+        let Range { start, end } = self.range;
+        let first = self.right_first.saturating_add(self.top()).max(start).min(end);
+        let some = self.right_first < self.right_end;
+        let last = if some { self.right_end.saturating_add(self.min_disparity) } else { 0 };
+        first..last.max(first).min(end)
     }
 
     /// The least number, a cost less 32768, that is not nearly as good as `best`; `weak` is that of [`Found::weak`].

@@ -1,6 +1,6 @@
 //! Plain Rust: what every other backend is held against.
 
-use super::jobs::{CodeRow, CostJob, KeyJob, PAD, SlideCodes};
+use super::jobs::{CHUNK, CodeRow, CostJob, KeyJob, PAD, SlideCodes};
 
 /// A sum over the rows of a window as it lies in a column.
 pub(super) trait Sum: Copy {
@@ -59,11 +59,14 @@ fn slide<S: Copy>(
     difference: impl Fn(u8, u8) -> u8 + Copy,
     add: impl Fn(&mut S, u8) + Copy,
 ) {
-    for (x, (column, &left)) in columns.chunks_exact_mut(stride.max(1)).zip(enter_left).enumerate() {
+    let mut columns = columns.chunks_exact_mut(stride.max(1));
+    for (x, &left) in enter_left.iter().enumerate() {
+        let Some(column) = columns.next() else { return };
         // Place e holds disparity `min + disparities - 1 - e`, whose right pixel is `x + 1 - min - disparities + e`.
         let Some(last) = x.checked_sub(min_disparity) else { continue };
-        let first = (last + 1).saturating_sub(disparities);
-        let skipped = disparities - (last + 1 - first);
+        let end = last.saturating_add(1);
+        let first = end.saturating_sub(disparities);
+        let skipped = disparities.saturating_sub(end.saturating_sub(first));
         let Some(column) = column.get_mut(skipped..disparities) else { return };
         let Some(right) = enter_right.get(first..=last) else { return };
         match leave {
@@ -87,23 +90,24 @@ fn slide<S: Copy>(
 pub(super) fn search_keys(job: KeyJob<'_>) {
     let KeyJob { search, limits, columns, work, right, found } = job;
     let disparities = search.disparities;
-    let Some(keys) = work.get_mut(PAD..PAD + disparities) else { return };
-    let column =
-        |x: usize| columns.get(x * search.stride..).and_then(|rest| rest.get(..disparities)).unwrap_or_default();
+    let Some(keys) = work.get_mut(PAD..PAD.saturating_add(disparities)) else { return };
+    let column = |x: usize| {
+        columns.get(x.saturating_mul(search.stride)..).and_then(|rest| rest.get(..disparities)).unwrap_or_default()
+    };
     if !search.follows {
         for (place, key) in keys.iter_mut().enumerate() {
             *key = (place as i16).wrapping_add(i16::MIN);
         }
-        for x in search.range.start.saturating_sub(search.radius + 1)..search.range.start + search.radius {
+        for x in search.window_before() {
             for (key, &sum) in keys.iter_mut().zip(column(x)) {
                 *key = key.wrapping_add(i16::from(sum) << 7);
             }
         }
     }
     let [even, odd] = right.tables;
-    for (i, x) in search.range.clone().enumerate() {
-        let leave = column(x.saturating_sub(search.radius + 1));
-        for ((key, &enter), &leave) in keys.iter_mut().zip(column(x + search.radius)).zip(leave) {
+    for (i, x) in (0..CHUNK).zip(search.range.clone()) {
+        let leave = column(search.leaving(x));
+        for ((key, &enter), &leave) in keys.iter_mut().zip(column(search.entering(x))).zip(leave) {
             // What a sum of at most 12 rows changes by fits 8 bits.
             *key = key.wrapping_add(i16::from(enter.wrapping_sub(leave) as i8) << 7);
         }
@@ -111,15 +115,15 @@ pub(super) fn search_keys(job: KeyJob<'_>) {
         let Some(inside) = keys.get(candidates.clone()).filter(|inside| !inside.is_empty()) else { continue };
         let least = inside.iter().fold(i16::MAX, |least, &key| least.min(key));
         let table = if x % 2 == 0 { &mut *even } else { &mut *odd };
-        let partner = (right.lead + x + candidates.start + 1).saturating_sub(search.min_disparity + disparities);
+        let partner = right.lead.saturating_add(x).saturating_add(candidates.start).saturating_sub(search.top());
         for (best, &key) in table.get_mut(partner..).unwrap_or_default().iter_mut().zip(inside) {
             *best = (*best).min(key ^ 0x7f);
         }
         let place = usize::from(least as u16 & 0x7f);
         let above = limits.above(least, found.weak(i));
-        let near = inside.iter().fold(0u16, |near, &key| near + u16::from(key < above));
+        let near = inside.iter().fold(0u16, |near, &key| near.wrapping_add(u16::from(key < above)));
         let at = |place: Option<usize>| place.and_then(|place| keys.get(place)).copied().unwrap_or(i16::MAX);
-        found.put(i, place, [at(place.checked_sub(1)), least, at(Some(place + 1))], near, above);
+        found.put(i, place, [at(place.checked_sub(1)), least, at(place.checked_add(1))], near, above);
     }
 }
 
@@ -127,35 +131,36 @@ pub(super) fn search_keys(job: KeyJob<'_>) {
 pub(super) fn search_costs<S: Sum>(job: CostJob<'_, S>) {
     let CostJob { search, columns, work, mut right, found } = job;
     let disparities = search.disparities;
-    let Some(costs) = work.get_mut(PAD..PAD + disparities) else { return };
-    let column =
-        |x: usize| columns.get(x * search.stride..).and_then(|rest| rest.get(..disparities)).unwrap_or_default();
+    let Some(costs) = work.get_mut(PAD..PAD.saturating_add(disparities)) else { return };
+    let column = |x: usize| {
+        columns.get(x.saturating_mul(search.stride)..).and_then(|rest| rest.get(..disparities)).unwrap_or_default()
+    };
     if !search.follows {
         costs.fill(i16::MIN);
-        for x in search.range.start.saturating_sub(search.radius + 1)..search.range.start + search.radius {
+        for x in search.window_before() {
             for (cost, &sum) in costs.iter_mut().zip(column(x)) {
                 *cost = cost.wrapping_add(sum.value() as i16);
             }
         }
     }
-    for (i, x) in search.range.clone().enumerate() {
-        let leave = column(x.saturating_sub(search.radius + 1));
-        for ((cost, &enter), &leave) in costs.iter_mut().zip(column(x + search.radius)).zip(leave) {
+    for (i, x) in (0..CHUNK).zip(search.range.clone()) {
+        let leave = column(search.leaving(x));
+        for ((cost, &enter), &leave) in costs.iter_mut().zip(column(search.entering(x))).zip(leave) {
             *cost = cost.wrapping_add(enter.value().wrapping_sub(leave.value()) as i16);
         }
         let candidates = search.candidates(x);
         let Some(inside) = costs.get(candidates.clone()).filter(|inside| !inside.is_empty()) else { continue };
         if let Some(right) = &mut right {
-            let top = search.min_disparity + disparities - 1;
-            let partner = (right.lead + x + candidates.start).saturating_sub(top);
-            offer(&mut right.tables, partner, inside, (top - candidates.start) as i16);
+            let top = search.top();
+            let partner = right.lead.saturating_add(x).saturating_add(candidates.start).saturating_sub(top);
+            offer(&mut right.tables, partner, inside, top.wrapping_sub(candidates.start) as i16);
         }
         let least = inside.iter().fold(i16::MAX, |least, &cost| least.min(cost));
-        let place = candidates.start + inside.iter().position(|&cost| cost == least).unwrap_or(0);
+        let place = candidates.start.saturating_add(inside.iter().position(|&cost| cost == least).unwrap_or(0));
         let above = search.above(least, found.weak(i));
-        let near = inside.iter().fold(0u16, |near, &cost| near + u16::from(cost < above));
+        let near = inside.iter().fold(0u16, |near, &cost| near.wrapping_add(u16::from(cost < above)));
         let at = |place: Option<usize>| place.and_then(|place| costs.get(place)).copied().unwrap_or(i16::MAX);
-        found.put(i, place, [at(place.checked_sub(1)), least, at(Some(place + 1))], near, above);
+        found.put(i, place, [at(place.checked_sub(1)), least, at(place.checked_add(1))], near, above);
     }
 }
 

@@ -121,8 +121,9 @@ impl Statistics {
 
     /// Share of the pixels that have a disparity.
     pub fn coverage(&self) -> f32 {
-        let without: u32 = self.pixels_without.iter().sum();
-        self.pixels_with_disparity as f32 / (self.pixels_with_disparity + without).max(1) as f32
+        let all =
+            self.pixels_without.iter().fold(self.pixels_with_disparity, |sum, pixels| sum.saturating_add(*pixels));
+        self.pixels_with_disparity as f32 / all.max(1) as f32
     }
 
     pub(super) fn count<const CELLS: usize>(
@@ -138,8 +139,8 @@ impl Statistics {
         self.surfaces_dropped = report.dropped;
         for surface in surfaces {
             match surface.class {
-                SurfaceClass::Ground | SurfaceClass::Horizontal => self.surfaces_horizontal += 1,
-                SurfaceClass::Vertical | SurfaceClass::Obstacle => self.surfaces_vertical += 1,
+                SurfaceClass::Ground | SurfaceClass::Horizontal => one_more(&mut self.surfaces_horizontal),
+                SurfaceClass::Vertical | SurfaceClass::Obstacle => one_more(&mut self.surfaces_vertical),
                 SurfaceClass::Slanted | SurfaceClass::Undefined => {}
             }
         }
@@ -151,15 +152,20 @@ impl Statistics {
         (self.cells_obstacle, self.cells_free, self.cells_disputed, self.cells_unconfirmed) = (0, 0, 0, 0);
         for cell in &map.cells {
             match cell.state {
-                CellState::Obstacle => self.cells_obstacle += 1,
-                CellState::Free => self.cells_free += 1,
+                CellState::Obstacle => one_more(&mut self.cells_obstacle),
+                CellState::Free => one_more(&mut self.cells_free),
                 CellState::Unknown(_) => {}
             }
             match cell.doubt {
                 Doubt::None => {}
-                Doubt::Unconfirmed => self.cells_unconfirmed += 1,
-                Doubt::Disputed => self.cells_disputed += 1,
+                Doubt::Unconfirmed => one_more(&mut self.cells_unconfirmed),
+                Doubt::Disputed => one_more(&mut self.cells_disputed),
             }
         }
     }
+}
+
+/// Counts one more of what a table has room for, which is less than 2^32.
+const fn one_more(count: &mut u32) {
+    *count = count.wrapping_add(1);
 }

@@ -97,7 +97,7 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
     ) -> Result<(), ConfigError> {
         let Setup { pair, frame, .. } = setup;
         let (width, height) = (pair.width as usize, pair.height as usize);
-        let pixels = width * height;
+        let pixels = width.saturating_mul(height);
         settings.check_detectors()?;
         settings.confidence.check()?;
         self.surfaces.configure(&settings.surfaces, width, height)?;

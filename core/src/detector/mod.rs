@@ -261,12 +261,12 @@ impl<
         self.matcher.begin();
         let MatchSettings { min_disparity, disparities, .. } = *self.matcher.settings();
         let first = usize::from(min_disparity);
-        let range = SearchRange { first, last: first + usize::from(disparities).saturating_sub(1) };
+        let range = SearchRange { first, last: first.saturating_add(usize::from(disparities).saturating_sub(1)) };
         self.content.begin(width, height, range);
         let [left_row, right_row] = &mut self.rows;
         let left_row = left_row.get_mut(..width).unwrap_or_default();
         let right_row = right_row.get_mut(..width).unwrap_or_default();
-        let mut next = 0;
+        let mut next = 0usize;
         for y in 0..height {
             probe.enter(Stage::Rectify);
             let left_span = self.rectifier.row(Side::Left, left, y, left_row);
@@ -274,11 +274,14 @@ impl<
             probe.enter(Stage::Match);
             let spans = [ValidSpan::from(left_span), ValidSpan::from(right_span)];
             self.matcher.push(left_row, right_row, spans[0], spans[1]);
-            while let Some(out) = self.disparity.get_mut(next * width..(next + 1) * width) {
+            while next < height {
+                // Within the picture, which the matcher has seen to fit.
+                let start = next.wrapping_mul(width);
+                let Some(out) = self.disparity.get_mut(start..start.wrapping_add(width)) else { break };
                 if !self.matcher.pull(next, out) {
                     break;
                 }
-                next += 1;
+                next = next.wrapping_add(1);
             }
             probe.enter(Stage::Health);
             self.content.push(y, [left_row, right_row], spans);
@@ -296,26 +299,29 @@ impl<
         let right_row = right_row.get_mut(..width).unwrap_or_default();
         // The first row that is not at the border of the picture is complete when this many have come.
         let [_, margin] = self.matcher.settings().margins();
-        let needed = 2 * margin + 1;
-        let mut matched = 0;
+        let needed = margin.saturating_mul(2).saturating_add(1);
+        let mut matched = 0usize;
         for strip in 0..EXCHANGE_ROWS {
-            let top = (height * (strip + 1) / (EXCHANGE_ROWS + 1)).saturating_sub(margin);
+            let top = (height.saturating_mul(strip + 1) / (EXCHANGE_ROWS + 1)).saturating_sub(margin);
             self.matcher.begin();
-            for y in top..top + needed {
-                let left_span = self.rectifier.row(Side::Left, right, y.min(height - 1), left_row);
-                let right_span = self.rectifier.row(Side::Right, left, y.min(height - 1), right_row);
+            for y in top..top.saturating_add(needed) {
+                let y = y.min(height.saturating_sub(1));
+                let left_span = self.rectifier.row(Side::Left, right, y, left_row);
+                let right_span = self.rectifier.row(Side::Right, left, y, right_row);
                 self.matcher.push(left_row, right_row, ValidSpan::from(left_span), ValidSpan::from(right_span));
             }
             let row = self.probe_row.get_mut(..width).unwrap_or_default();
             if self.matcher.pull(margin, row) {
-                matched += row.iter().filter(|pixel| pixel.has_value()).count();
+                let values = row.iter().fold(0usize, |count, pixel| count.wrapping_add(usize::from(pixel.has_value())));
+                matched = matched.saturating_add(values);
             }
         }
-        let share = matched as f32 / (EXCHANGE_ROWS * width) as f32;
+        let share = matched as f32 / EXCHANGE_ROWS.saturating_mul(width) as f32;
         // False matches are scattered, and the validation by surface size is not run here: they are counted on both sides.
         let statistics = &self.detection.statistics;
-        let as_given = statistics.pixels_with_disparity + statistics.pixels_without[Reason::SmallSurface as usize];
-        let as_given = as_given as f32 / (width * height) as f32;
+        let small = statistics.pixels_without[Reason::SmallSurface as usize];
+        let as_given = statistics.pixels_with_disparity.saturating_add(small);
+        let as_given = as_given as f32 / width.saturating_mul(height) as f32;
         share >= EXCHANGED_SHARE && share > 2.0 * as_given
     }
 

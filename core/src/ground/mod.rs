@@ -167,10 +167,10 @@ impl GroundFinder {
     ) {
         for root in regions.roots() {
             let table = surfaces.table();
-            let mut on_plane = 0;
+            let mut on_plane = 0u32;
             for surface in regions.members(root).filter_map(|place| table.get(place)) {
                 if surface.class == SurfaceClass::Horizontal {
-                    on_plane += if self.lies_on(plane, surface) { surface.pixels() } else { 0 };
+                    on_plane = on_plane.saturating_add(if self.lies_on(plane, surface) { surface.pixels() } else { 0 });
                 }
             }
             let grows = on_plane as f32 >= self.min_support;
@@ -264,10 +264,10 @@ impl GroundFinder {
             let near = |surface: &Surface| plane.height_m(surface.points.mean_m).abs() <= tolerance;
             let tells =
                 |surface: &&Surface| self.tells_plane(surface, height) && near(surface) && noise.allows(surface);
-            let mut support = 0;
+            let mut support = 0u32;
             let mut points = Scatter::default();
             for surface in table.iter().filter(tells) {
-                support += surface.pixels();
+                support = support.saturating_add(surface.pixels());
                 points = points.joined(&self.weighed(surface, noise.shift_per_m));
             }
             plane = GroundPlane { support, ..GroundPlane::through(&points, frame)? };
@@ -353,7 +353,7 @@ impl GroundFinder {
             let near = x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m;
             near && plane.height_m(surface.points.mean_m) < -self.settings.height_tolerance_m
         };
-        let pixels: u32 = table.iter().filter(below).map(Surface::pixels).sum();
+        let pixels = table.iter().filter(below).map(Surface::pixels).fold(0, u32::saturating_add);
         pixels as f32 <= MOST_BELOW * plane.support as f32
     }
 }

@@ -113,18 +113,18 @@ impl Terrain {
             self.begin();
             for y in (0..height).rev().step_by(STEP_Y) {
                 let (row, labels) = (picture.row(y), surfaces.labels_row(y));
-                for (x0, (pixels, labels)) in (0..).step_by(TILE).zip(row.chunks(TILE).zip(labels.chunks(TILE))) {
+                for x0 in (0..row.len()).step_by(TILE) {
                     let table = surfaces.of_tile(x0, y);
                     if table.is_empty() {
                         continue;
                     }
-                    for (i, (pixels, labels)) in pixels.chunks(STEP_X).zip(labels.chunks(STEP_X)).enumerate() {
-                        let (Some(pixel), Some(&label)) = (pixels.first(), labels.first()) else { continue };
+                    let end = x0.saturating_add(TILE).min(row.len());
+                    for x in (x0..end).step_by(STEP_X) {
+                        let (Some(pixel), Some(&label)) = (row.get(x), labels.get(x)) else { break };
                         let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(i));
                         let Some(surface) = surface.filter(|surface| surface.class != SurfaceClass::Vertical) else {
                             continue;
                         };
-                        let x = x0 + i * STEP_X;
                         let z = depth.distance_m(pixel.steps());
                         let direction = rays.direction(x as f32, y as f32);
                         let point: [f32; 3] = core::array::from_fn(|i| rays.origin_m[i] + z * direction[i]);
@@ -174,8 +174,7 @@ impl Terrain {
                 let (expected_m, reach_m) = self.expected_m(i, j, point[0], sure, bend);
                 // What stands there hides the ground, which is taken to go on under it: what lies behind is not reached over it.
                 if sure && height_m > expected_m + reach_m {
-                    self.weight[i][j] += 1.0;
-                    self.sum_m[i][j] += expected_m;
+                    self.count(i, j, expected_m);
                 }
                 (height_m - expected_m).abs() <= reach_m
             }
@@ -185,8 +184,17 @@ impl Terrain {
             }
         };
         if accepted {
-            self.weight[i][j] += 1.0;
-            self.sum_m[i][j] += height_m;
+            self.count(i, j, height_m);
+        }
+    }
+
+    /// Counts a height in a patch.
+    fn count(&mut self, i: usize, j: usize, height_m: f32) {
+        let weight = self.weight.get_mut(i).and_then(|row| row.get_mut(j));
+        let sum_m = self.sum_m.get_mut(i).and_then(|row| row.get_mut(j));
+        if let Some((weight, sum_m)) = weight.zip(sum_m) {
+            *weight += 1.0;
+            *sum_m += height_m;
         }
     }
 
@@ -194,8 +202,8 @@ impl Terrain {
     /// lie above or below.
     fn expected_m(&self, i: usize, j: usize, x_m: f32, sure: bool, bend: &Bend) -> (f32, f32) {
         let known = |i: usize, j: usize| {
-            let weight = *self.weight.get(i)?.get(j)?;
-            (weight >= LEAST_WEIGHT).then(|| self.sum_m[i][j] / weight)
+            let (weight, sum_m) = (*self.weight.get(i)?.get(j)?, *self.sum_m.get(i)?.get(j)?);
+            (weight >= LEAST_WEIGHT).then(|| sum_m / weight)
         };
         let inner = if j < ACROSS / 2 { j + 1 } else { j.wrapping_sub(1) };
         // The patch itself, those between it and the robot, and at last the nearest one before it: what hides the ground hides
@@ -213,7 +221,7 @@ impl Terrain {
             .or_else(|| Some(level(known(i.wrapping_sub(1), j)?, 0.0, 1)))
             .or_else(|| Some(level(known(i.wrapping_sub(1), inner)?, 1.0, 1)))
             .or_else(|| Some(level(known(i, inner)?, 1.0, 0)))
-            .or_else(|| (2..=i).find_map(|back| Some(level(known(i - back, j)?, 0.0, back))));
+            .or_else(|| (2..=i).find_map(|back| Some(level(known(i.checked_sub(back)?, j)?, 0.0, back))));
         let slope = if sure { bend.max_slope } else { 0.0 };
         match around {
             Some((lift_m, patches)) => (lift_m, bend.tolerance_m + slope * patches as f32 * self.patch_m),
@@ -303,7 +311,7 @@ fn spread_line<const N: usize>(line: &mut [f32; N], share: f32) {
         carried = share * (carried + own);
     }
     let mut behind = 0.0;
-    for (patch, before) in line.iter_mut().zip(before).rev() {
+    for (patch, before) in line.iter_mut().rev().zip(before.iter().rev()) {
         let own = *patch;
         *patch = own + before + behind;
         behind = share * (behind + own);

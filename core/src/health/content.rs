@@ -113,21 +113,23 @@ impl<const WIDTH: usize> Content<WIDTH> {
         done: usize,
     ) {
         while self.next_strip < STRIPS {
-            let y = self.height * (self.next_strip + 1) / (STRIPS + 1);
+            let y = self.height.saturating_mul(self.next_strip + 1) / (STRIPS + 1);
             if done <= y {
                 return;
             }
             // Near the upper and lower edge there are not enough rows, and there never will be.
-            if y > MARGIN && y + MARGIN + 1 < self.height {
-                if !matcher.has_filtered(y + MARGIN) {
+            if y > MARGIN && y.saturating_add(MARGIN + 1) < self.height {
+                if !matcher.has_filtered(y.saturating_add(MARGIN)) {
                     return;
                 }
-                let row = disparity.get(y * width..(y + 1) * width).unwrap_or_default();
+                // Within the picture.
+                let start = y.wrapping_mul(width);
+                let row = disparity.get(start..start.wrapping_add(width)).unwrap_or_default();
                 if let Some(strip) = matcher.strip(y) {
-                    self.sparse.look(&strip, row, self.range, 2 * y >= self.height);
+                    self.sparse.look(&strip, row, self.range, y >= self.height.saturating_sub(y));
                 }
             }
-            self.next_strip += 1;
+            self.next_strip = self.next_strip.wrapping_add(1);
         }
     }
 

@@ -52,11 +52,12 @@ impl Exposure {
         for y in (0..picture.height()).step_by(STEP) {
             for &grey in picture.row(y).iter().step_by(STEP) {
                 sum = sum.saturating_add(u32::from(grey));
-                dark += u32::from(grey <= DARK);
-                bright += u32::from(grey >= BRIGHT);
+                // No count exceeds that of the pixels of a picture, which is less than 2^32.
+                dark = dark.wrapping_add(u32::from(grey <= DARK));
+                bright = bright.wrapping_add(u32::from(grey >= BRIGHT));
                 (least, most) = (least.min(grey), most.max(grey));
                 hash = (hash ^ u64::from(grey)).wrapping_mul(0x0000_0100_0000_01b3);
-                count += 1;
+                count = count.wrapping_add(1);
             }
         }
         let each = 1.0 / count.max(1) as f32;

@@ -150,8 +150,8 @@ fn out_of_range_below(picture: DisparityPicture<'_>) -> f32 {
     let said = DisparityPixel::none(Reason::OutOfRange);
     // Zero reads as out of range, too. In short pieces the count fits 16 bits, as wide as the pixels.
     let is_so = |pixel: &DisparityPixel| u16::from(*pixel == said) | u16::from(pixel.bits() == 0);
-    let out_of_range: usize =
-        lower.chunks(4096).map(|piece| usize::from(piece.iter().map(is_so).fold(0u16, u16::wrapping_add))).sum();
+    let counts = lower.chunks(4096).map(|piece| usize::from(piece.iter().map(is_so).fold(0u16, u16::wrapping_add)));
+    let out_of_range = counts.fold(0, usize::wrapping_add);
     out_of_range as f32 / lower.len().max(1) as f32
 }
 

@@ -75,12 +75,14 @@ impl Pairing {
         let still = [is_still(0), is_still(1)];
         let mut best = (f32::NEG_INFINITY, 0);
         for age in 0..self.known {
-            let Some([left_then, right_then]) = self.frames.get((self.newest + FRAMES - age) % FRAMES) else {
+            // A ring, and the age is less than its length.
+            let place = (self.newest % FRAMES + FRAMES).wrapping_sub(age) % FRAMES;
+            let Some([left_then, right_then]) = self.frames.get(place) else {
                 continue;
             };
-            let frames = age as i8 + 1;
+            let frames = (age as i8).wrapping_add(1);
             for (late, likeness, lag) in
-                [(1, left_then.likeness(right, 0), frames), (0, left.likeness(right_then, 0), -frames)]
+                [(1, left_then.likeness(right, 0), frames), (0, left.likeness(right_then, 0), frames.wrapping_neg())]
             {
                 if !still[late] && likeness > best.0 {
                     best = (likeness, lag);
@@ -94,13 +96,13 @@ impl Pairing {
         } else {
             PairingSign::default()
         };
-        self.newest = (self.newest + 1) % FRAMES;
+        self.newest = self.newest.wrapping_add(1) % FRAMES;
         if let Some(frame) = self.frames.get_mut(self.newest) {
             for (old, new) in frame.iter_mut().zip(&self.now) {
                 old.clone_from(new);
             }
         }
-        self.known = (self.known + 1).min(FRAMES);
+        self.known = self.known.saturating_add(1).min(FRAMES);
         sign
     }
 }

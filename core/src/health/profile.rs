@@ -66,9 +66,12 @@ impl Profile {
         let band = y / self.rows_per_band.max(1);
         let (Some(grey), Some(contrast)) = (self.grey.get_mut(band), self.contrast.get_mut(band)) else { return };
         let Some(after) = valid.get(2..).filter(|after| !after.is_empty()) else { return };
-        let sum: u32 = valid.iter().map(|&grey| u32::from(grey)).sum();
-        let steps: u32 =
-            after.iter().zip(valid).map(|(&after, &before)| u32::from(after.abs_diff(before).min(STRONGEST))).sum();
+        // A row has fewer than 2^24 pixels: no sum is too large.
+        let sum = valid.iter().fold(0u32, |sum, &grey| sum.wrapping_add(u32::from(grey)));
+        let steps = after
+            .iter()
+            .zip(valid)
+            .fold(0u32, |sum, (&after, &before)| sum.wrapping_add(u32::from(after.abs_diff(before).min(STRONGEST))));
         *grey += sum as f32 / valid.len() as f32;
         *contrast += steps as f32 / after.len() as f32;
     }
@@ -123,9 +126,10 @@ impl Signature {
             let mine = mine.iter().zip(mine.iter().skip(between)).skip(skip(lowered));
             for ((&upper, &below), &b) in mine.zip(theirs.iter().skip(skip(-lowered))) {
                 let (a, b) = (i32::from(upper) + i32::from(below), i32::from(b));
-                ab += a * b;
-                aa += a * a;
-                bb += b * b;
+                // 2 x BANDS products of less than 2^16.
+                ab = ab.wrapping_add(a.wrapping_mul(b));
+                aa = aa.wrapping_add(a.wrapping_mul(a));
+                bb = bb.wrapping_add(b.wrapping_mul(b));
             }
         }
         if aa == 0 || bb == 0 {

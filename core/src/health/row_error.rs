@@ -116,7 +116,9 @@ impl SparseMatches {
         let end = end.saturating_sub(RADIUS + 1);
         let width = end.saturating_sub(start);
         for place in 0..PLACES {
-            let part = start + width * place / PLACES..start + width * (place + 1) / PLACES;
+            // Within the row.
+            let at = |place: usize| start.wrapping_add(width.wrapping_mul(place) / PLACES);
+            let part = at(place)..at(place + 1);
             if let Some(x) = most_contrast(self.chosen, strip, row, part) {
                 self.look_at(strip, x, row.get(x).copied().unwrap_or_default(), range, lower);
             }
@@ -134,12 +136,15 @@ impl SparseMatches {
         let known = pixel.has_value().then(|| usize::from((pixel.steps() + 8) >> 4));
         if lower {
             let within = match known {
-                Some(disparity) => best_along(self.chosen, strip, x, disparity.saturating_sub(1)..=disparity + 1),
+                Some(disparity) => {
+                    best_along(self.chosen, strip, x, disparity.saturating_sub(1)..=disparity.saturating_add(1))
+                }
                 None => best_along(self.chosen, strip, x, range.first..=range.last),
             };
-            let nearer = best_along(self.chosen, strip, x, range.last..=NEARER * range.last);
-            self.lower += 1;
-            self.near += u16::from(nearer.is_some_and(|(cost, _)| within.is_none_or(|(best, _)| 2 * cost < best)));
+            let nearer = best_along(self.chosen, strip, x, range.last..=range.last.saturating_mul(NEARER));
+            let far_better = |cost: u32| within.is_none_or(|(best, _)| cost.saturating_mul(2) < best);
+            self.lower = self.lower.saturating_add(1);
+            self.near = self.near.saturating_add(u16::from(nearer.is_some_and(|(cost, _)| far_better(cost))));
         }
         let disparity = match known {
             Some(disparity) => disparity,
@@ -175,7 +180,8 @@ fn middle_of(errors: &[i16]) -> i16 {
     let before = errors.len() / 2;
     (0..15).rev().fold(0, |least: u16, bit| {
         let next = least | 1 << bit;
-        let smaller = errors.iter().filter(|error| error.unsigned_abs() < next).count();
+        let smaller =
+            errors.iter().fold(0usize, |count, error| count.wrapping_add(usize::from(error.unsigned_abs() < next)));
         if smaller <= before { next } else { least }
     }) as i16
 }
@@ -216,12 +222,15 @@ fn contrasts(strip: &Strip<'_, { 2 * MARGIN + 1 }>, row: &[DisparityPixel], part
         // One more to either side of the lanes.
         let [above, middle, below] = rows.map(|row| window::<{ LANES + 2 }>(row, first.saturating_sub(1)));
         let steps = |a: u8, b: u8| u16::from(a.abs_diff(b));
-        let across: [u16; LANES + 2] = from_fn(|i| steps(above[i], middle[i]) + steps(middle[i], below[i]));
+        // Six steps of at most 255 at most.
+        let sum = u16::wrapping_add;
+        let across: [u16; LANES + 2] = from_fn(|i| sum(steps(above[i], middle[i]), steps(middle[i], below[i])));
         let along: [u16; LANES + 1] =
-            from_fn(|i| [above, middle, below].iter().map(|row| steps(row[i], row[i + 1])).sum());
+            from_fn(|i| [above, middle, below].iter().fold(0, |all, row| sum(all, steps(row[i], row[i + 1]))));
         let contrasts: [u16; LANES] =
-            from_fn(|i| (across[i] + across[i + 1] + across[i + 2]).min(along[i] + along[i + 1]));
-        for (x, &contrast) in (first..part.end).zip(&contrasts).step_by(2) {
+            from_fn(|i| sum(sum(across[i], across[i + 1]), across[i + 2]).min(sum(along[i], along[i + 1])));
+        // Every second place.
+        for (x, &[contrast, _]) in (first..part.end).step_by(2).zip(contrasts.as_chunks::<2>().0) {
             if contrast < LEAST_CONTRAST || contrast <= best.0 {
                 continue;
             }
@@ -248,18 +257,21 @@ fn window<const N: usize>(row: &[u8], first: usize) -> [u8; N] {
 
 /// The row in which the right picture shows the patch at `x`, against that of the left, 1/16 px; `None` if that cannot be told.
 fn row_error(chosen: Chosen, strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, disparity: usize) -> Option<i16> {
-    let disparities = disparity.saturating_sub(ALONG)..=disparity + ALONG;
+    let disparities = disparity.saturating_sub(ALONG)..=disparity.saturating_add(ALONG);
     let mut costs = [u32::MAX; 2 * REACH + 1];
     for (down, cost) in costs.iter_mut().enumerate() {
         *cost = best_at(chosen, strip, x, disparities.clone(), down)?.0;
     }
     let (best, cost) = costs.iter().copied().enumerate().min_by_key(|(_, cost)| *cost)?;
     let aside = [best.checked_sub(2), best.checked_add(2)].map(|place| place.and_then(|place| costs.get(place)));
-    let rises = aside.into_iter().flatten().all(|&other| other >= cost + LEAST_RISE && 4 * other >= 5 * cost);
+    // Costs have 16 bits.
+    let far_above =
+        |other: u32| other >= cost.saturating_add(LEAST_RISE) && other.saturating_mul(4) >= cost.saturating_mul(5);
+    let rises = aside.into_iter().flatten().all(|&other| far_above(other));
     let above = *costs.get(best.checked_sub(1)?)?;
-    let below = *costs.get(best + 1)?;
+    let below = *costs.get(best.checked_add(1)?)?;
     let fraction = refine(above as i32, cost as i32, below as i32);
-    rises.then_some((best as i32 - REACH as i32) as i16 * 16 + fraction as i16)
+    rises.then_some((best as i16).wrapping_sub(REACH as i16).wrapping_mul(16).wrapping_add(fraction as i16))
 }
 
 /// The least cost along the row itself, and its disparity.
@@ -319,10 +331,12 @@ fn least_cost(
     while upto > first {
         let from = upto.saturating_sub(LANES).max(first);
         let costs = costs(strip, x, from, down);
-        let least = costs.iter().take(upto - from).copied().min().unwrap_or(u16::MAX);
+        let lanes = upto.wrapping_sub(from);
+        let least = costs.iter().take(lanes).copied().min().unwrap_or(u16::MAX);
         if best.is_none_or(|(cost, _)| u32::from(least) < cost) {
-            let lane = costs.iter().take(upto - from).rposition(|&cost| cost == least);
-            best = lane.map(|lane| (u32::from(least), x - (from + lane))).or(best);
+            let lane = (0..lanes).zip(&costs).filter(|(_, cost)| **cost == least).map(|(lane, _)| lane).last();
+            // Not to the right of the place in the left picture: no disparity is negative.
+            best = lane.map(|lane| (u32::from(least), x.wrapping_sub(from).wrapping_sub(lane))).or(best);
         }
         upto = from;
     }
@@ -334,14 +348,16 @@ fn least_cost(
 #[inline(always)]
 fn costs(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, there: usize, down: usize) -> [u16; LANES] {
     let mut costs = [0u16; LANES];
-    let rows = strip.left.iter().skip(REACH).zip(strip.right.iter().skip(down)).take(2 * RADIUS + 1);
+    let right = strip.right.get(down..).unwrap_or_default();
+    let rows = strip.left.iter().skip(REACH).zip(right).take(2 * RADIUS + 1);
     for (left, right) in rows {
         let left: [u8; 2 * RADIUS + 1] = window(left, x.saturating_sub(RADIUS));
         let right: [u8; LANES + 2 * RADIUS] = window(right, there.saturating_sub(RADIUS));
         for (column, &grey) in left.iter().enumerate() {
             let places = right.iter().skip(column);
             for (cost, &other) in costs.iter_mut().zip(places) {
-                *cost += u16::from(grey.abs_diff(other));
+                // 49 differences of at most 255.
+                *cost = cost.wrapping_add(u16::from(grey.abs_diff(other)));
             }
         }
     }

@@ -85,9 +85,9 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
         for (block, quad) in seen.iter_mut().zip(quads.get(first..end).unwrap_or_default()) {
             // Four bytes added up in one word: all blocks of a row can go through this side by side.
             let word = u32::from_le_bytes(*quad);
-            let pairs = (word & 0x00ff_00ff) + (word >> 8 & 0x00ff_00ff);
+            let pairs = (word & 0x00ff_00ff).wrapping_add(word >> 8 & 0x00ff_00ff);
             // A block that was not seen stays so: its mark is the largest value.
-            *block = block.saturating_add((pairs + (pairs >> 16)) as u16);
+            *block = block.saturating_add(pairs.wrapping_add(pairs >> 16) as u16);
         }
         if y % BLOCK == BLOCK - 1 {
             self.end_blocks(y / BLOCK, row.len() / BLOCK);
@@ -99,15 +99,18 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
     fn end_blocks(&mut self, row: usize, count: usize) {
         let Layout { across, down, columns, .. } = self.layout;
         let blocks = self.blocks.get_mut(..count).unwrap_or_default();
-        if let (Some(steps), Some(counts)) = (self.steps.get_mut(row / down), self.counts.get_mut(row / down)) {
-            for (column, (steps, count)) in steps.iter_mut().zip(counts).enumerate().take(columns) {
-                let first = column * across;
+        let row = row / down.max(1);
+        if let (Some(steps), Some(counts)) = (self.steps.get_mut(row), self.counts.get_mut(row)) {
+            for (column, (steps, count)) in (0..columns).zip(steps.iter_mut().zip(counts)) {
+                let first = column.saturating_mul(across);
                 // The last of a column is compared with the first of the next.
-                let blocks = blocks.get(first..(first + across + 1).min(blocks.len())).unwrap_or_default();
+                let end = first.saturating_add(across).saturating_add(1).min(blocks.len());
+                let blocks = blocks.get(first..end).unwrap_or_default();
                 let pairs = blocks.iter().zip(blocks.iter().skip(1));
                 for (&a, &b) in pairs {
                     let known = a != UNSEEN && b != UNSEEN;
-                    *steps += if known { u32::from(a.abs_diff(b)) } else { 0 };
+                    // A tile has fewer than 2^16 blocks: the sum fits.
+                    *steps = steps.wrapping_add(if known { u32::from(a.abs_diff(b)) } else { 0 });
                     *count = count.saturating_add(u16::from(known));
                 }
             }
@@ -119,7 +122,7 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
     fn structure(&self, row: usize, column: usize) -> Option<f32> {
         let Layout { across, down, .. } = self.layout;
         let count = usize::from(*self.counts.get(row)?.get(column)?);
-        let enough = 2 * count >= across * down;
+        let enough = count.saturating_mul(2) >= across.saturating_mul(down);
         let steps = *self.steps.get(row)?.get(column)?;
         enough.then(|| steps as f32 / (count.max(1) * BLOCK * BLOCK) as f32)
     }
@@ -132,23 +135,27 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
     /// For each tile, once the tiles that lie within the range.
     pub(super) fn lacks(&self, other: &Self, range_px: (usize, usize), structure_grey: f32) -> Covering {
         let Layout { columns, rows, across, .. } = self.layout;
-        let tile_px = (across * BLOCK).max(1);
+        let tile_px = across.saturating_mul(BLOCK).max(1);
         // A tile more to either side: the range begins and ends within tiles.
-        let [before, after] = [range_px.0, range_px.1].map(|px| px.div_ceil(tile_px) + 1);
+        let [before, after] = [range_px.0, range_px.1]
+            .map(|px| (px / tile_px).saturating_add(1 + usize::from(!px.is_multiple_of(tile_px))));
         let (mut flat, mut seen) = (0u32, 0u32);
         let mut covering = Covering::default();
         for row in 0..rows {
             for column in 0..columns {
                 let Some(mine) = self.structure(row, column) else { continue };
-                seen += 1;
-                flat += u32::from(mine < 0.5 * structure_grey);
+                // At most as many as there are tiles.
+                seen = seen.wrapping_add(1);
+                flat = flat.wrapping_add(u32::from(mine < 0.5 * structure_grey));
                 // The tiles beside the range may be cut off, those within it may not.
-                let within = column + 1 >= before && column + after <= columns;
-                let places = column.saturating_sub(before)..(column + after + 1).min(columns);
+                let last = column.saturating_add(after);
+                let within = column.saturating_add(1) >= before && last <= columns;
+                let places = column.saturating_sub(before)..last.saturating_add(1).min(columns);
                 let theirs = places.map(|place| other.structure(row, place).unwrap_or(0.0)).fold(f32::MAX, f32::min);
                 if within && theirs >= structure_grey {
-                    covering.judged += 1;
-                    covering.covered += u16::from(mine < 0.5 * structure_grey && theirs > 3.0 * mine);
+                    let covered = mine < 0.5 * structure_grey && theirs > 3.0 * mine;
+                    covering.judged = covering.judged.wrapping_add(1);
+                    covering.covered = covering.covered.wrapping_add(u16::from(covered));
                 }
             }
         }

@@ -114,7 +114,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         // The surfaces of another picture say nothing about this one.
         if (picture.width(), picture.height()) == surfaces.size() {
             let Self { settings, obstacle_heights_m, evidence, common, chosen } = self;
-            let evidence = &mut evidence[..settings.geometry.len()];
+            let evidence = evidence.get_mut(..settings.geometry.len()).unwrap_or_default();
             let obstacle_heights_m = *obstacle_heights_m;
             arch::compiled(
                 *chosen,
@@ -136,7 +136,8 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
 
     /// What was said of each cell: room for numbers by cell, before [`Self::begin`].
     pub(crate) fn table(&mut self) -> &mut [Evidence] {
-        &mut self.evidence[..self.settings.geometry.len()]
+        // Never more than there is: `configure` made sure of it.
+        self.evidence.get_mut(..self.settings.geometry.len()).unwrap_or_default()
     }
 
     /// What a pixel says of the cell at `[x, y]` of the vehicle frame, metres.
@@ -165,10 +166,10 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let geometry = self.settings.geometry;
         map.geometry = geometry;
         map.cells.clear();
-        for index in 0..geometry.len() {
-            let cell = self.decide(index, picture, view, ground, ground_seen);
+        for (index, evidence) in (0..geometry.len()).zip(&self.evidence) {
+            let cell = self.decide(index, evidence, picture, view, ground, ground_seen);
             // Cannot fail: `configure` made sure that there is room.
-            let _ = map.cells.push(verdict(&self.evidence[index], cell));
+            let _ = map.cells.push(verdict(evidence, cell));
         }
         smear::take_out(map, view.place, &self.settings);
         shadow::mark(map, view.place);
@@ -178,6 +179,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
     fn decide<const DISPARITIES: usize>(
         &self,
         index: usize,
+        evidence: &Evidence,
         picture: DisparityPicture<'_>,
         view: &View<'_, DISPARITIES>,
         ground: &Terrain,
@@ -187,7 +189,6 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let (i, j) = geometry.cell_at(index);
         // Seen from the camera: what can be seen and told of a cell is a matter of where the pair is.
         let [x, y] = view.place.to_pair(geometry.centre_m(i, j).into());
-        let evidence = self.evidence[index];
         let unknown = |reason| Cell { state: CellState::Unknown(reason), ..Cell::default() };
         let seen = Sight::of_ground(x, y, view, ground);
         if x * x + y * y > self.settings.max_range_m * self.settings.max_range_m {

@@ -49,8 +49,7 @@ impl SectorDistances {
     /// One pass over the cells.
     pub fn of<const CELLS: usize>(map: &ObstacleMap<CELLS>, width_deg: f32) -> Self {
         let mut sectors = Self::unknown(width_deg);
-        let mut nearest_m = [f32::INFINITY; SECTOR_COUNT];
-        let (mut free, mut in_view) = ([0u16; SECTOR_COUNT], [0u16; SECTOR_COUNT]);
+        let mut seen = [Seen::NOTHING; SECTOR_COUNT];
         for (index, cell) in map.cells.iter().enumerate() {
             let (i, j) = map.geometry.cell_at(index);
             let (x, y) = map.geometry.centre_m(i, j);
@@ -58,21 +57,21 @@ impl SectorDistances {
             if place.is_nan() || place < 0.0 || place >= SECTOR_COUNT as f32 {
                 continue;
             }
-            let place = place as usize;
+            let Some(seen) = seen.get_mut(place as usize) else { continue };
             match cell.state {
-                CellState::Obstacle => nearest_m[place] = nearest_m[place].min(libm::sqrtf(x * x + y * y)),
-                CellState::Free => free[place] += 1,
+                CellState::Obstacle => seen.nearest_m = seen.nearest_m.min(libm::sqrtf(x * x + y * y)),
+                CellState::Free => seen.free = seen.free.saturating_add(1),
                 CellState::Unknown(UnknownReason::OutsideView | UnknownReason::TooFar | UnknownReason::TooNear) => {
                     continue;
                 }
                 CellState::Unknown(_) => {}
             }
-            in_view[place] += 1;
+            seen.in_view = seen.in_view.saturating_add(1);
         }
-        for (place, distance_dm) in sectors.distance_dm.iter_mut().enumerate() {
-            *distance_dm = if nearest_m[place].is_finite() {
-                libm::roundf(nearest_m[place] * 10.0).min(f32::from(SECTOR_CLEAR_DM - 1)) as u8
-            } else if free[place] > 0 && free[place] >= in_view[place].div_ceil(2) {
+        for (distance_dm, seen) in sectors.distance_dm.iter_mut().zip(&seen) {
+            *distance_dm = if seen.nearest_m.is_finite() {
+                libm::roundf(seen.nearest_m * 10.0).min(f32::from(SECTOR_CLEAR_DM - 1)) as u8
+            } else if seen.free > 0 && seen.free >= seen.in_view.saturating_sub(seen.free) {
                 SECTOR_CLEAR_DM
             } else {
                 SECTOR_UNKNOWN
@@ -80,4 +79,17 @@ impl SectorDistances {
         }
         sectors
     }
+}
+
+/// What the cells of a sector say.
+#[derive(Clone, Copy)]
+struct Seen {
+    nearest_m: f32,
+    /// Free cells, and all in view.
+    free: u16,
+    in_view: u16,
+}
+
+impl Seen {
+    const NOTHING: Self = Self { nearest_m: f32::INFINITY, free: 0, in_view: 0 };
 }

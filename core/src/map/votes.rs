@@ -99,7 +99,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
                 for (common, surface) in self.common.iter_mut().zip(found) {
                     *common = Common::of(surface, self.ground);
                 }
-                for y in y0..(y0 + TILE).min(self.picture.height()) {
+                for y in y0..y0.saturating_add(TILE).min(self.picture.height()) {
                     self.row(x0, y);
                 }
             }

@@ -1,5 +1,7 @@
 //! Census codes: which of eight pixels around a pixel are darker.
 
+use core::ops::Range;
+
 use crate::arch::{self, Chosen};
 
 /// Pixels that the code looks at up, down, left and right.
@@ -22,16 +24,23 @@ pub(super) fn codes(chosen: Chosen, rows: [&[u8]; ROWS], out: &mut [u8]) {
     out.fill(0);
     let Some(inner) = width.checked_sub(2 * REACH) else { return };
     let [top, upper, _, middle, _, lower, bottom] = rows;
-    let done = arch::census_codes(chosen, [top, upper, middle, lower, bottom], &mut out[REACH..REACH + inner]);
+    // As long as the rows.
+    let Some(out) = out.get_mut(REACH..).and_then(|out| out.get_mut(..inner)) else { return };
+    let done = arch::census_codes(chosen, [top, upper, middle, lower, bottom], out);
     // Slices of one length, one for each neighbour, so that the loop runs without checks.
     let neighbours = [(upper, 1), (upper, 5), (lower, 1), (lower, 5), (middle, 0), (middle, 6), (top, 3), (bottom, 3)];
-    let centre = &middle[REACH + done..REACH + inner];
-    let out = &mut out[REACH + done..REACH + inner];
+    let (centre, out) = (part(middle, REACH, done..inner), out.get_mut(done..).unwrap_or_default());
     for (bit, (row, x)) in neighbours.into_iter().enumerate() {
-        for ((code, &centre), &neighbour) in out.iter_mut().zip(centre).zip(&row[x + done..x + inner]) {
+        for ((code, &centre), &neighbour) in out.iter_mut().zip(centre).zip(part(row, x, done..inner)) {
             *code |= u8::from(neighbour < centre) << bit;
         }
     }
+}
+
+/// The pixels `range` of `row`, counted from pixel `first`.
+#[inline(always)]
+fn part(row: &[u8], first: usize, range: Range<usize>) -> &[u8] {
+    row.get(first..).and_then(|row| row.get(range)).unwrap_or_default()
 }
 
 #[cfg(test)]

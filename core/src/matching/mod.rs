@@ -178,8 +178,9 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         }
         // A row of the window needs rows around it for what is compared.
         let [_, margin] = self.settings.margins();
-        let border = next < margin || next + margin >= self.height;
-        let available = if border { next < self.rows.pushed() } else { next + margin < self.rows.pushed() };
+        let lowest = next.saturating_add(margin);
+        let border = next < margin || lowest >= self.height;
+        let available = if border { next < self.rows.pushed() } else { lowest < self.rows.pushed() };
         if !available {
             return false;
         }
@@ -195,9 +196,10 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     /// the narrow one could not tell one place from another.
     fn match_row(&mut self, y: usize, out: &mut [DisparityPixel]) {
         out.fill(DisparityPixel::none(Reason::OutsideValidArea));
-        self.weak[..self.width].fill(false);
+        self.weak.get_mut(..self.width).unwrap_or_default().fill(false);
         self.pass(y, Window::Narrow, out);
-        if self.settings.wide_window_width > 0 && self.weak[..self.width].contains(&true) {
+        let weak = self.weak.get(..self.width).unwrap_or_default();
+        if self.settings.wide_window_width > 0 && weak.contains(&true) {
             self.pass(y, Window::Wide, out);
         }
     }
@@ -222,11 +224,12 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if first >= end {
             return;
         }
-        let area = u32::from(width) * u32::from(settings.window_height);
+        // Windows and percents were checked: nothing here is near the limits of the numbers.
+        let area = u32::from(width).saturating_mul(u32::from(settings.window_height));
         let decide = Decide {
-            min_texture: (u32::from(settings.texture) * area) >> 4,
-            weak_texture: (u32::from(settings.weak_texture) * area) >> 4,
-            max_saturated: area * u32::from(settings.saturated_percent) / 100,
+            min_texture: area.saturating_mul(u32::from(settings.texture)) >> 4,
+            weak_texture: area.saturating_mul(u32::from(settings.weak_texture)) >> 4,
+            max_saturated: area.saturating_mul(u32::from(settings.saturated_percent)) / 100,
             unique: uniqueness_percent.map(|percent| percent > 0),
             only_weak: window == Window::Wide,
             keys: window == Window::Narrow && self.plan.keys,
@@ -241,7 +244,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             right_first: usize::from(right.start) + margin,
             right_end: usize::from(right.end).min(self.width).saturating_sub(margin),
             uniqueness_percent,
-            is_small: settings.window_height * 8 <= 127 && area * 8 <= 2040,
+            is_small: settings.window_height <= 127 / 8 && area <= 2040 / 8,
         };
         if window == Window::Narrow {
             self.right.begin();
@@ -255,7 +258,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
                 break;
             }
             search.follows = search.range.end == run.start && !search.range.is_empty();
-            search.range = run.start..run.end.min(run.start + CHUNK);
+            search.range = run.start..run.end.min(run.start.saturating_add(CHUNK));
             run.start = search.range.end;
             let (sums, found) = (&mut self.sums, &mut self.found);
             let evidence = self.columns.evidence();
@@ -280,18 +283,19 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     fn weak_run(&self, range: core::ops::Range<usize>, radius: usize) -> core::ops::Range<usize> {
         let weak = self.weak.get(range.clone()).unwrap_or_default();
         let Some(skipped) = first_weak(weak) else { return range.end..range.end };
-        let (mut end, mut gap) = (skipped, 0);
-        for (i, &weak) in weak.iter().enumerate().skip(skipped) {
+        let (mut end, mut gap) = (skipped, 0usize);
+        for (i, &weak) in (1..=weak.len()).zip(weak).skip(skipped) {
             if weak {
-                (end, gap) = (i + 1, 0);
+                (end, gap) = (i, 0);
             } else {
-                gap += 1;
+                gap = gap.saturating_add(1);
                 if gap > radius / 3 {
                     break;
                 }
             }
         }
-        range.start + skipped..range.start + end
+        // Within the range.
+        range.start.wrapping_add(skipped)..range.start.wrapping_add(end)
     }
 
     /// Finds the best places of a chunk, in the way of the plan.
@@ -320,8 +324,9 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
 fn first_weak(weak: &[bool]) -> Option<usize> {
     const BLOCK: usize = 32;
     let some = |block: &[bool]| block.iter().fold(false, |some, &weak| some | weak);
-    let (block, pixels) = weak.chunks(BLOCK).enumerate().find(|(_, block)| some(block))?;
-    Some(block * BLOCK + pixels.iter().position(|&weak| weak)?)
+    let mut blocks = (0..weak.len()).step_by(BLOCK).zip(weak.chunks(BLOCK));
+    let (first, pixels) = blocks.find(|(_, block)| some(block))?;
+    pixels.iter().position(|&weak| weak)?.checked_add(first)
 }
 
 /// Which of the two windows a row is matched with.

@@ -33,23 +33,26 @@ impl Plan {
         width: usize,
     ) -> Self {
         let (disparities, min_disparity) = (usize::from(settings.disparities), usize::from(settings.min_disparity));
-        let largest = u32::from(settings.window_width) * u32::from(settings.window_height) * 8;
-        let keys = settings.cost == MatchCost::Census && largest <= 510 && disparities <= 128;
-        let back = min_disparity + disparities - 1;
+        let area = u32::from(settings.window_width).saturating_mul(u32::from(settings.window_height));
+        let keys = settings.cost == MatchCost::Census && area <= 510 / 8 && disparities <= 128;
+        let back = min_disparity.saturating_add(disparities).saturating_sub(1);
         // Keys count places from 0 at the largest disparity; turned, from 127 down.
         let key_disparity = (back as u16).wrapping_sub(127);
         // That of the signal processing instructions counts them so that it ends at 127.
         let key_disparity_dsp = settings.min_disparity;
         let mut backend = if settings.cost == MatchCost::Census { backend } else { Backend::Plain };
         while backend != Backend::Plain {
-            let stride = disparities.next_multiple_of(backend.lanes());
+            let lanes = backend.lanes().max(1);
+            let stride = (disparities / lanes)
+                .saturating_add(usize::from(!disparities.is_multiple_of(lanes)))
+                .saturating_mul(lanes);
             // What half as wide a vector would do without is no gain.
             let room = backend.takes(disparities)
-                && stride - disparities < MOST_PADDING
-                && width * stride <= WIDTH * DISPARITIES * 2
+                && stride.saturating_sub(disparities) < MOST_PADDING
+                && width.saturating_mul(stride) <= WIDTH * DISPARITIES * 2
                 && back <= LEAD_ROWS * WIDTH
-                && width + stride <= WIDTH + WIDTH / 2
-                && stride + 2 * PAD <= 4 * DISPARITIES;
+                && width.saturating_add(stride) <= WIDTH + WIDTH / 2
+                && stride.saturating_add(2 * PAD) <= 4 * DISPARITIES;
             if let Some(chosen) = Chosen::new(backend).filter(|_| room) {
                 let key_disparity = if backend == Backend::Dsp { key_disparity_dsp } else { key_disparity };
                 return Self { chosen, stride, keys, lead: back, key_disparity };

@@ -124,7 +124,7 @@ impl<const WIDTH: usize> Rows<WIDTH> {
 
     /// Number of the newest filtered row.
     pub(super) fn newest_filtered(&self) -> Option<usize> {
-        self.pushed.checked_sub(self.reach + 1).filter(|&y| y >= self.reach)
+        self.pushed.checked_sub(self.reach.saturating_add(1)).filter(|&y| y >= self.reach)
     }
 
     #[inline(always)]
@@ -140,10 +140,11 @@ impl<const WIDTH: usize> Rows<WIDTH> {
         let split_codes = chosen.backend().splits_codes();
         let slot = self.pushed % GREY;
         let width = left.len();
-        self.grey_left[slot][..width].copy_from_slice(left);
-        self.grey_right[slot][..width].copy_from_slice(right);
+        for (kept, row) in [(&mut self.grey_left[slot], left), (&mut self.grey_right[slot], right)] {
+            copy(kept, row);
+        }
         self.grey_spans[slot] = (left_span, right_span);
-        self.pushed += 1;
+        self.pushed = self.pushed.saturating_add(1);
         let Some(y) = self.newest_filtered() else { return };
         let Self { grey_left, grey_right, grey_spans, kept, reach, .. } = self;
         let [kept_left, left_codes, right_codes, right_high, kept_right] = &mut kept[y % KEPT];
@@ -151,21 +152,25 @@ impl<const WIDTH: usize> Rows<WIDTH> {
             [(&*grey_left, kept_left, left_codes), (&*grey_right, kept_right, &mut *right_codes)]
         {
             // The ring holds rows y - 3 to y + 3; those that a filter does not reach may be missing.
-            let rows: [&[u8]; GREY] = core::array::from_fn(|i| &grey[(y + GREY + i - census::REACH) % GREY][..width]);
+            let rows: [&[u8]; GREY] = core::array::from_fn(|i| {
+                let slot = (y % GREY).wrapping_add(i).wrapping_add(GREY - census::REACH) % GREY;
+                grey[slot].get(..width).unwrap_or_default()
+            });
             let [_, _, above, middle, below, _, _] = rows;
-            prefilter::filter(settings.prefilter, above, middle, below, &mut filtered[..width]);
+            prefilter::filter(settings.prefilter, above, middle, below, filtered.get_mut(..width).unwrap_or_default());
             if settings.cost == MatchCost::Census {
-                census::codes(chosen, rows, &mut codes[..width]);
+                census::codes(chosen, rows, codes.get_mut(..width).unwrap_or_default());
             }
         }
-        let grey = &grey_left[y % GREY][..width];
-        for ((low, high), &grey) in right_codes[..width].iter_mut().zip(right_high).zip(grey) {
+        let grey = grey_left[y % GREY].get(..width).unwrap_or_default();
+        for ((low, high), &grey) in right_codes.iter_mut().zip(right_high).zip(grey) {
             let saturated = (grey == SATURATED[0]) | (grey == SATURATED[1]);
             let upper = if split_codes { *low >> 4 } else { 0 };
             *high = upper | if saturated { SATURATED_FLAG } else { 0 };
             *low &= if split_codes { 0x0f } else { 0xff };
         }
-        self.kept_spans[y % KEPT] = (y - *reach..=y + *reach).map(|y| grey_spans[y % GREY]).fold(EVERYTHING, both);
+        let around = y.saturating_sub(*reach)..y.saturating_add(*reach).saturating_add(1);
+        self.kept_spans[y % KEPT] = around.map(|y| grey_spans[y % GREY]).fold(EVERYTHING, both);
     }
 
     /// Grey values after the filter, of row `y`, which must be among the last [`KEPT`]; left and right.
@@ -181,7 +186,10 @@ impl<const WIDTH: usize> Rows<WIDTH> {
     /// Census codes of row `y`.
     pub(super) fn codes(&self, y: usize, width: usize) -> CodeRow<'_> {
         let all = self.kept.as_flattened().as_flattened();
-        let from = |kind: Kind| all.get(((y % KEPT) * KINDS + kind as usize - LEAD_ROWS) * WIDTH..).unwrap_or_default();
+        let from = |kind: Kind| {
+            let row = (y % KEPT * KINDS).wrapping_add(kind as usize).wrapping_sub(LEAD_ROWS);
+            all.get(row.wrapping_mul(WIDTH)..).unwrap_or_default()
+        };
         CodeRow {
             left: self.kind(y, Kind::LeftCodes, width),
             low: from(Kind::RightCodes),
@@ -191,13 +199,21 @@ impl<const WIDTH: usize> Rows<WIDTH> {
     }
 
     fn kind(&self, y: usize, kind: Kind, width: usize) -> &[u8] {
-        &self.kept[y % KEPT][kind as usize][..width]
+        self.kept[y % KEPT][kind as usize].get(..width).unwrap_or_default()
     }
 
     /// Columns that are valid in all filtered rows within `radius - 1` of row `y`, left and right.
     pub(super) fn spans(&self, y: usize, radius: usize) -> (ValidSpan, ValidSpan) {
-        let first = (y + 1).saturating_sub(radius);
-        (first..y + radius).map(|y| self.kept_spans[y % KEPT]).fold(EVERYTHING, both)
+        let first = y.saturating_add(1).saturating_sub(radius);
+        (first..y.saturating_add(radius)).map(|y| self.kept_spans[y % KEPT]).fold(EVERYTHING, both)
+    }
+}
+
+/// Copies as much of a row as there is room for; the matcher takes none that is too long.
+fn copy(to: &mut [u8], from: &[u8]) {
+    let length = to.len().min(from.len());
+    if let (Some(to), Some(from)) = (to.get_mut(..length), from.get(..length)) {
+        to.copy_from_slice(from);
     }
 }
 

@@ -88,8 +88,9 @@ impl CostMap {
         map: &mut MapBuilder<CELLS>,
     ) -> Option<GroundPlane> {
         self.measure(picture, view, map);
-        let flat = map.table().iter().filter(|slot| self.is_flat(Column::of(slot))).count();
-        if flat < usize::from(self.settings.min_columns) {
+        let mut flat = map.table().iter().filter(|slot| self.is_flat(Column::of(slot)));
+        let least = usize::from(self.settings.min_columns);
+        if least > 0 && flat.nth(least.wrapping_sub(1)).is_none() {
             return None;
         }
         let mut sums = PointSums::default();
@@ -115,7 +116,9 @@ impl CostMap {
         let CostMapSettings { min_height_m, max_height_m, .. } = self.settings;
         map.begin();
         codes.fill(OTHER);
-        for (y, codes) in (0..picture.height()).zip(codes.chunks_exact_mut(picture.width().max(1))) {
+        let mut rows = codes.chunks_exact_mut(picture.width().max(1));
+        for y in 0..picture.height() {
+            let Some(codes) = rows.next() else { break };
             for (x, point) in row_points(picture, view.depth, view.rays, y) {
                 let height_m = ground.height_m(point);
                 let (code, vote) = match height_m {
@@ -161,7 +164,7 @@ impl CostMap {
         for_each_point(picture, view, map, |slot, point| {
             let column = Column::of(slot);
             if column.points < u16::MAX {
-                let sum = column.sum.saturating_add((height_mm(point) - LOWEST_MM as i32).unsigned_abs());
+                let sum = column.sum.saturating_add(height_mm(point).abs_diff(LOWEST_MM as i32));
                 Column { points: column.points + 1, sum, ..column }.put(slot);
             }
         });

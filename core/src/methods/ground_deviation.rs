@@ -87,7 +87,9 @@ impl GroundDeviation {
         self.pair = Some((*pair, *frame));
         self.height_known = height_known;
         let (width, height) = (pair.width as usize, pair.height as usize);
-        let along = |length: usize, stride: &usize| length.div_ceil((*stride).max(1));
+        let along = |length: usize, stride: &usize| {
+            (length / (*stride).max(1)).saturating_add(usize::from(!length.is_multiple_of(*stride)))
+        };
         let fits = |stride: &usize| {
             along(width, stride).saturating_mul(along(height, stride)) <= usize::from(settings.samples)
         };
@@ -145,8 +147,9 @@ impl GroundDeviation {
         }
         let (samples, squares) = found?;
         let (normal, camera_height_m) = self.plausible(&plane)?;
-        let support = u32::try_from(samples).unwrap_or(u32::MAX).saturating_mul((self.stride * self.stride) as u32);
-        let pixels = (pair.width as usize * pair.height as usize) as f32;
+        let support =
+            u32::try_from(samples).unwrap_or(u32::MAX).saturating_mul(self.stride.saturating_mul(self.stride) as u32);
+        let pixels = (pair.width as usize).saturating_mul(pair.height as usize) as f32;
         if (support as f32) < self.ground.min_support_permille * 1.0e-3 * pixels {
             return None;
         }
@@ -174,9 +177,12 @@ impl GroundDeviation {
         let Some((pair, _)) = self.pair else { return };
         let centre = centre(&pair);
         let limit = (16.0 * self.settings.deviation_px).max(self.settings.deviation_sigmas * ground.noise_steps);
-        for (y, codes) in (0..picture.height()).zip(codes.chunks_exact_mut(picture.width().max(1))) {
+        let mut rows = codes.chunks_exact_mut(picture.width().max(1));
+        for y in 0..picture.height() {
+            let Some(codes) = rows.next() else { break };
             let v = y as f32 - centre.1;
-            for ((x, pixel), code) in picture.row(y).iter().enumerate().zip(codes) {
+            let row = picture.row(y);
+            for ((x, pixel), code) in (0..row.len()).zip(row).zip(codes) {
                 let deviation = f32::from(pixel.steps()) - ground.plane.steps_at(x as f32 - centre.0, v);
                 *code = match deviation {
                     _ if !pixel.has_value() => OTHER,
@@ -201,9 +207,9 @@ impl GroundDeviation {
     /// Pixels with a disparity, evenly spread: column and row from the centre, and the disparity in 1/16 px.
     fn samples<'a>(&self, picture: DisparityPicture<'a>) -> impl Iterator<Item = (i32, i32, u16)> + use<'a> {
         let (stride, (u0, v0)) = (self.stride.max(1), whole_centre(picture));
-        (stride / 2..picture.height()).step_by(stride).flat_map(move |y| {
+        evenly(picture.height(), stride).flat_map(move |y| {
             let row = picture.row(y);
-            (stride / 2..row.len()).step_by(stride).filter_map(move |x| {
+            evenly(row.len(), stride).filter_map(move |x| {
                 let pixel = row.get(x).filter(|pixel| pixel.has_value())?;
                 Some((from_centre(x, u0), from_centre(y, v0), pixel.steps()))
             })
@@ -236,6 +242,16 @@ fn centre(pair: &RectifiedPair) -> (f32, f32) {
 
 fn whole_centre(picture: DisparityPicture<'_>) -> (i32, i32) {
     ((picture.width() / 2) as i32, (picture.height() / 2) as i32)
+}
+
+/// One of `stride` places among `length`, from the middle of the first stride on.
+fn evenly(length: usize, stride: usize) -> impl Iterator<Item = usize> {
+    let mut next = stride / 2;
+    core::iter::from_fn(move || {
+        let here = next;
+        next = next.saturating_add(stride);
+        (here < length).then_some(here)
+    })
 }
 
 /// A column or row counted from the centre; pictures have at most 2^31 of either.

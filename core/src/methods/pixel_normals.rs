@@ -102,14 +102,17 @@ impl<const WIDTH: usize> PixelNormals<WIDTH> {
         };
         let steps = |x: usize, y: Option<usize>| y.and_then(|y| picture.row(y).get(x)).map_or(0, steps_of);
         let radius = self.settings.window / 2;
-        let area = u32::from(self.settings.window) * u32::from(self.settings.window);
-        let least = i64::from((area * u32::from(self.settings.min_filled_percent)).div_ceil(100).max(3));
+        // Of a window of up to 21 x 21 pixels: far from the limits of the numbers.
+        let (edge, percent) = (u64::from(self.settings.window), u64::from(self.settings.min_filled_percent));
+        let least = (edge.wrapping_mul(edge).wrapping_mul(percent).wrapping_add(99) / 100).max(3) as i64;
         let most_squares = 256.0 * self.settings.max_rms_px * self.settings.max_rms_px;
-        for (y, codes) in (0..picture.height()).zip(codes.chunks_exact_mut(picture.width().max(1))) {
+        let mut rows = codes.chunks_exact_mut(picture.width().max(1));
+        for y in 0..picture.height() {
+            let Some(codes) = rows.next() else { break };
             move_columns(self.columns.get_mut(..width).unwrap_or_default(), y, radius, steps);
             let columns = self.columns.get(..width).unwrap_or_default();
             let row = picture.row(y).iter().zip(windows(columns, radius));
-            for ((x, (pixel, sums)), code) in row.enumerate().zip(codes) {
+            for ((x, (pixel, sums)), code) in (0..width).zip(row).zip(codes) {
                 *code = NONE;
                 if steps_of(pixel) == 0 || sums.n < least {
                     continue;
@@ -139,39 +142,41 @@ impl<const WIDTH: usize> PixelNormals<WIDTH> {
     /// Gives pixels without a class that of the nearest pixel that has one, along pixels of contiguous disparity, forth and back.
     fn adopt(&self, picture: DisparityPicture<'_>, steps_of: &impl Fn(&DisparityPixel) -> u16, codes: &mut [u8]) {
         let (width, height, step) = (picture.width(), picture.height(), self.step_sixteenths);
-        let farthest = ONE_AWAY * (self.settings.window - self.settings.window % 2) as u8;
+        let farthest = ONE_AWAY.saturating_mul((self.settings.window & !1) as u8);
         let pixels = picture.pixels();
         let mut take = |at: usize, from: usize| {
             let (Some(&here), Some(&there)) = (codes.get(at), codes.get(from)) else { return };
-            let nearer = here == NONE || here & !CLASS_MASK > (there & !CLASS_MASK) + ONE_AWAY;
+            let nearer = here == NONE || here & !CLASS_MASK > (there & !CLASS_MASK).saturating_add(ONE_AWAY);
             if there == NONE || there & !CLASS_MASK >= farthest || !nearer {
                 return;
             }
             let (Some(a), Some(b)) = (pixels.get(at).map(steps_of), pixels.get(from).map(steps_of)) else { return };
             let contiguous = a != 0 && b != 0 && a.abs_diff(b) <= step;
             if let Some(code) = codes.get_mut(at).filter(|_| contiguous) {
-                *code = there + ONE_AWAY;
+                *code = there.saturating_add(ONE_AWAY);
             }
         };
+        // Places within the picture, and those beside them.
+        let place = |x: usize, y: usize| y.wrapping_mul(width).wrapping_add(x);
         for y in 0..height {
             for x in 0..width {
-                let at = y * width + x;
+                let at = place(x, y);
                 if x > 0 {
-                    take(at, at - 1);
+                    take(at, at.wrapping_sub(1));
                 }
                 if y > 0 {
-                    take(at, at - width);
+                    take(at, at.wrapping_sub(width));
                 }
             }
         }
         for y in (0..height).rev() {
             for x in (0..width).rev() {
-                let at = y * width + x;
-                if x + 1 < width {
-                    take(at, at + 1);
+                let at = place(x, y);
+                if x.wrapping_add(1) < width {
+                    take(at, at.wrapping_add(1));
                 }
-                if y + 1 < height {
-                    take(at, at + width);
+                if y.wrapping_add(1) < height {
+                    take(at, at.wrapping_add(width));
                 }
             }
         }

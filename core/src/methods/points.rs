@@ -17,7 +17,8 @@ pub(super) fn row_points<'a, const DISPARITIES: usize>(
     y: usize,
 ) -> impl Iterator<Item = (usize, [f32; 3])> + 'a {
     let (start, step) = (rays.direction(0.0, y as f32), rays.along_row);
-    picture.row(y).iter().enumerate().filter_map(move |(x, pixel)| {
+    let row = picture.row(y);
+    (0..row.len()).zip(row).filter_map(move |(x, pixel)| {
         let z = depth.distance_m(pixel.steps());
         let along = |i: usize| rays.origin_m[i] + z * (start[i] + x as f32 * step[i]);
         (z > 0.0).then(|| (x, [along(0), along(1), along(2)]))
@@ -47,7 +48,8 @@ impl PointSums {
         }
         let d: [f32; 3] = core::array::from_fn(|i| point[i] - self.first[i]);
         let products = [d[0] * d[0], d[0] * d[1], d[0] * d[2], d[1] * d[1], d[1] * d[2], d[2] * d[2]];
-        self.count += 1;
+        // At most `RUN`: then it begins anew.
+        self.count = self.count.wrapping_add(1);
         self.sum.iter_mut().zip(d).for_each(|(sum, d)| *sum += d);
         self.products.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
         if self.count == RUN {

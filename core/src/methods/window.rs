@@ -1,26 +1,29 @@
 //! Sums over the window around each pixel, exact, at a cost that does not grow with the window.
 
+use core::num::Wrapping;
+
 use super::disparity_plane::PlaneSums;
 
 /// Sums over the pixels of one column within the rows of the window; rows `v` from that of the pixel.
 ///
-/// The largest window has 21 rows: rows fit 16 bits, and no sum of disparities 32.
+/// The largest window has 21 rows: rows fit 16 bits, and no sum of disparities 32. So nothing wraps that is written so.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct ColumnSums {
-    n: i16,
-    v: i16,
-    vv: i16,
-    d: i32,
-    vd: i32,
-    dd: i64,
+    n: Wrapping<i16>,
+    v: Wrapping<i16>,
+    vv: Wrapping<i16>,
+    d: Wrapping<i32>,
+    vd: Wrapping<i32>,
+    dd: Wrapping<i64>,
 }
 
 impl ColumnSums {
-    pub(super) const ZERO: Self = Self { n: 0, v: 0, vv: 0, d: 0, vd: 0, dd: 0 };
+    pub(super) const ZERO: Self =
+        Self { n: Wrapping(0), v: Wrapping(0), vv: Wrapping(0), d: Wrapping(0), vd: Wrapping(0), dd: Wrapping(0) };
 
     /// Counts rows from the next one on.
     fn move_down(&mut self) {
-        self.vv += self.n - 2 * self.v;
+        self.vv += self.n - self.v - self.v;
         self.v -= self.n;
         self.vd -= self.d;
     }
@@ -30,13 +33,13 @@ impl ColumnSums {
         if steps == 0 {
             return;
         }
-        let d = i32::from(steps);
+        let (v, d) = (Wrapping(v), Wrapping(i32::from(steps)));
         self.n += 1;
         self.v += v;
         self.vv += v * v;
         self.d += d;
-        self.vd += i32::from(v) * d;
-        self.dd += i64::from(d) * i64::from(d);
+        self.vd += Wrapping(i32::from(v.0)) * d;
+        self.dd += Wrapping(i64::from(d.0)) * Wrapping(i64::from(d.0));
     }
 
     /// Takes the pixel in row `v` away again.
@@ -44,39 +47,42 @@ impl ColumnSums {
         if steps == 0 {
             return;
         }
-        let d = i32::from(steps);
+        let (v, d) = (Wrapping(v), Wrapping(i32::from(steps)));
         self.n -= 1;
         self.v -= v;
         self.vv -= v * v;
         self.d -= d;
-        self.vd -= i32::from(v) * d;
-        self.dd -= i64::from(d) * i64::from(d);
+        self.vd -= Wrapping(i32::from(v.0)) * d;
+        self.dd -= Wrapping(i64::from(d.0)) * Wrapping(i64::from(d.0));
     }
 }
 
 impl PlaneSums {
     /// Counts columns from the next one on.
     fn move_right(&mut self) {
-        self.uu += self.n - 2 * self.u;
-        self.uv -= self.v;
-        self.ud -= self.d;
-        self.u -= self.n;
+        self.uu = self.uu.wrapping_add(self.n.wrapping_sub(self.u.wrapping_mul(2)));
+        self.uv = self.uv.wrapping_sub(self.v);
+        self.ud = self.ud.wrapping_sub(self.d);
+        self.u = self.u.wrapping_sub(self.n);
     }
 
     /// Adds (`sign` 1) or takes away (-1) a column.
     fn add_column(&mut self, column: &ColumnSums, u: i64, sign: i64) {
-        let n = sign * i64::from(column.n);
-        let (v, d) = (sign * i64::from(column.v), sign * i64::from(column.d));
-        self.n += n;
-        self.u += u * n;
-        self.v += v;
-        self.d += d;
-        self.uu += u * u * n;
-        self.uv += u * v;
-        self.vv += sign * i64::from(column.vv);
-        self.ud += u * d;
-        self.vd += sign * i64::from(column.vd);
-        self.dd += sign * column.dd;
+        // As small as [`PlaneSums::add`] says.
+        let add = |sum: &mut i64, more: i64| *sum = sum.wrapping_add(more);
+        let product = i64::wrapping_mul;
+        let n = product(sign, column.n.0.into());
+        let (v, d) = (product(sign, column.v.0.into()), product(sign, column.d.0.into()));
+        add(&mut self.n, n);
+        add(&mut self.u, product(u, n));
+        add(&mut self.v, v);
+        add(&mut self.d, d);
+        add(&mut self.uu, product(product(u, u), n));
+        add(&mut self.uv, product(u, v));
+        add(&mut self.vv, product(sign, column.vv.0.into()));
+        add(&mut self.ud, product(u, d));
+        add(&mut self.vd, product(sign, column.vd.0.into()));
+        add(&mut self.dd, product(sign, column.dd.0));
     }
 }
 
@@ -92,7 +98,8 @@ pub(super) fn move_columns(
     steps: impl Fn(usize, Option<usize>) -> u16,
 ) {
     let reach = usize::from(radius);
-    let r = radius as i16;
+    let below = radius as i16;
+    let above = below.wrapping_neg().wrapping_sub(1);
     for (x, column) in columns.iter_mut().enumerate() {
         if y == 0 {
             *column = ColumnSums::ZERO;
@@ -101,9 +108,9 @@ pub(super) fn move_columns(
             }
         } else {
             column.move_down();
-            column.remove(-r - 1, steps(x, (y - 1).checked_sub(reach)));
+            column.remove(above, steps(x, y.wrapping_sub(1).checked_sub(reach)));
         }
-        column.add(r, steps(x, Some(y + reach)));
+        column.add(below, steps(x, y.checked_add(reach)));
     }
 }
 
@@ -113,19 +120,20 @@ pub(super) fn move_columns(
 /// Two steps for each pixel, and `radius` more.
 pub(super) fn windows(columns: &[ColumnSums], radius: u16) -> impl Iterator<Item = PlaneSums> {
     let reach = usize::from(radius);
-    let r = i64::from(radius);
+    let right = i64::from(radius);
+    let left = right.wrapping_neg().wrapping_sub(1);
     let mut sums = PlaneSums::default();
     // As if the pixel before the first had been the last.
-    for (column, u) in columns.iter().take(reach).zip(1..) {
+    for (column, u) in columns.iter().take(reach).zip(1..=right) {
         sums.add_column(column, u, 1);
     }
     (0..columns.len()).map(move |x| {
         sums.move_right();
-        if let Some(column) = x.checked_sub(reach + 1).and_then(|x| columns.get(x)) {
-            sums.add_column(column, -r - 1, -1);
+        if let Some(column) = x.checked_sub(reach.wrapping_add(1)).and_then(|x| columns.get(x)) {
+            sums.add_column(column, left, -1);
         }
-        if let Some(column) = columns.get(x + reach) {
-            sums.add_column(column, r, 1);
+        if let Some(column) = x.checked_add(reach).and_then(|x| columns.get(x)) {
+            sums.add_column(column, right, 1);
         }
         sums
     })

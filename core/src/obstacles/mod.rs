@@ -98,7 +98,7 @@ impl ObstacleFinder {
         obstacles: &mut Vec<Obstacle, OBSTACLES, u16>,
     ) -> u32 {
         obstacles.clear();
-        let mut dropped = 0;
+        let mut dropped = 0u32;
         regions.join(surfaces, picture, |surface| self.stands_up(surface, ground));
         for root in regions.roots() {
             let table = surfaces.table();
@@ -114,7 +114,7 @@ impl ObstacleFinder {
                     surface.class = SurfaceClass::Obstacle;
                 }
             }
-            dropped += insert(obstacles, obstacle);
+            dropped = dropped.saturating_add(insert(obstacles, obstacle));
         }
         dropped
     }
@@ -222,16 +222,12 @@ fn within_half_turn(angle_rad: f32) -> f32 {
 fn insert<const N: usize>(obstacles: &mut Vec<Obstacle, N, u16>, obstacle: Obstacle) -> u32 {
     let distance = obstacle.distance_m();
     let place = obstacles.iter().position(|other| other.distance_m() > distance).unwrap_or(obstacles.len());
-    let full = obstacles.is_full();
-    if full {
-        if place == obstacles.len() {
-            return 1;
-        }
-        obstacles.pop();
+    let mut moved = obstacle;
+    for listed in obstacles.iter_mut().skip(place) {
+        core::mem::swap(listed, &mut moved);
     }
-    // Cannot fail: there is room now, and the place lies within the list.
-    let _ = obstacles.insert(place, obstacle);
-    u32::from(full)
+    // The farthest of all: where the list is full it has no room.
+    u32::from(obstacles.push(moved).is_err())
 }
 
 #[cfg(test)]

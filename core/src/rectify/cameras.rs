@@ -215,16 +215,19 @@ impl View {
             (z > 0.0).then(|| [x / z, y / z])
         };
         for axis in 0..2 {
+            // The mask says to the compiler that it is one of two.
+            let axis = axis & 1;
+            let [here, beside] = if axis == 0 { high } else { [high[1], high[0]] };
             let along = |step: u16, across: f32| {
                 let t = f32::from(step) / f32::from(SIDE_POINTS - 1);
-                let place = low + t * (high[1 - axis] - low);
+                let place = low + t * (beside - low);
                 direction(if axis == 0 { [across, place] } else { [place, across] })
             };
             for step in 0..SIDE_POINTS {
                 if let Some(found) = along(step, low) {
                     self.low[axis] = self.low[axis].max(found[axis]);
                 }
-                if let Some(found) = along(step, high[axis]) {
+                if let Some(found) = along(step, here) {
                     self.high[axis] = self.high[axis].min(found[axis]);
                 }
             }

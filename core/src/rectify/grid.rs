@@ -71,9 +71,12 @@ impl<const NODES: usize> Grid<NODES> {
     pub(super) fn fill(&mut self, map: &CameraMap, width: usize, height: usize) {
         self.plane = Plane::tangent(map, width, height);
         self.columns = side_nodes(width);
-        for (index, node) in self.nodes.iter_mut().take(self.columns * side_nodes(height)).enumerate() {
-            let (u, v) = (index % self.columns * STEP, index / self.columns * STEP);
-            *node = node_value(map, &self.plane, u, v);
+        // A picture has at least one column of nodes.
+        for (row, nodes) in self.nodes.chunks_mut(self.columns.max(1)).enumerate().take(side_nodes(height)) {
+            for (column, node) in nodes.iter_mut().enumerate() {
+                let [u, v] = [column, row].map(|nodes| nodes.saturating_mul(STEP));
+                *node = node_value(map, &self.plane, u, v);
+            }
         }
     }
 
@@ -126,7 +129,7 @@ impl Iterator for Segments<'_> {
         let segment = match (self.left, right) {
             (Some(left), Some(right)) => {
                 let start = |i: usize| self.base[i].wrapping_add(left[i] << STEP_SHIFT);
-                let slope = |i: usize| self.along_row[i].wrapping_add(right[i] - left[i]);
+                let slope = |i: usize| self.along_row[i].wrapping_add(right[i].wrapping_sub(left[i]));
                 Some(Segment { start: [start(0), start(1)], slope: [slope(0), slope(1)] })
             }
             _ => None,
@@ -166,10 +169,10 @@ impl Plane {
 
     fn place_px(&self, u: usize, v: usize) -> [f32; 2] {
         core::array::from_fn(|i| {
-            let place = i64::from(self.origin[i])
-                + i64::from(self.along_row[i]) * u as i64
-                + i64::from(self.along_column[i]) * v as i64;
-            place as f32 / PLACE_ONE
+            // 32 bits times the number of a pixel, of which no picture has 2^31 in a row or column.
+            let across = i64::from(self.along_row[i]).wrapping_mul(u as i64);
+            let down = i64::from(self.along_column[i]).wrapping_mul(v as i64);
+            i64::from(self.origin[i]).wrapping_add(across).wrapping_add(down) as f32 / PLACE_ONE
         })
     }
 }

@@ -33,7 +33,7 @@ pub enum Side {
 
 /// Nodes per camera that rectified pictures of `width x height` need: the `GRID` of a [`Rectifier`].
 pub const fn grid_nodes(width: usize, height: usize) -> usize {
-    side_nodes(width) * side_nodes(height)
+    side_nodes(width).saturating_mul(side_nodes(height))
 }
 
 /// Makes rectified rows from raw pictures, for rectified pictures of up to `GRID` nodes ([`grid_nodes`]).

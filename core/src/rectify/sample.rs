@@ -42,14 +42,14 @@ impl<const NODES: usize> Steps for SampleRow<'_, NODES> {
         let mut runs = Runs::default();
         let mut segments = grid.segments(y);
         let (chunks, rest) = out.as_chunks_mut::<STEP>();
-        let mut begin = 0;
+        let mut begin = 0usize;
         for chunk in chunks {
             // None beyond the last: the row is longer than the rectified picture.
             let segment = segments.next().flatten();
             let Some(segment) = segment else {
                 chunk.fill(0);
                 runs.end_at(begin);
-                begin += STEP;
+                begin = begin.wrapping_add(STEP);
                 runs.start = begin;
                 continue;
             };
@@ -58,7 +58,8 @@ impl<const NODES: usize> Steps for SampleRow<'_, NODES> {
             if !whole && !source.fill_inside(place, segment.slope, chunk) {
                 source.fill_each(segment, begin, chunk, &mut runs);
             }
-            begin += STEP;
+            // Within the row.
+            begin = begin.wrapping_add(STEP);
         }
         match segments.next().flatten() {
             Some(segment) => source.fill_each(segment, begin, rest, &mut runs),
@@ -117,14 +118,17 @@ impl<'a> Source<'a> {
     /// Fills a segment pixel by pixel; `begin` is the column of the first.
     fn fill_each(&self, segment: Segment, begin: usize, out: &mut [u8], runs: &mut Runs) {
         let mut place = step(segment.start, [HALF_WEIGHT; 2]);
-        for (index, pixel) in out.iter_mut().enumerate() {
+        let mut column = begin;
+        for pixel in out {
+            let next = column.wrapping_add(1);
             if let Some(value) = self.at(place) {
                 *pixel = value;
             } else {
                 *pixel = 0;
-                runs.end_at(begin + index);
-                runs.start = begin + index + 1;
+                runs.end_at(column);
+                runs.start = next;
             }
+            column = next;
             place = step(place, segment.slope);
         }
     }
@@ -151,7 +155,7 @@ impl<'a> Source<'a> {
         if low[0] < 0 || low[1] < 0 || right >= self.last[0] << PLACE_SHIFT || top.saturating_add(2) > self.last[1] {
             return false;
         }
-        let bytes = self.data.get(top as usize * self.stride + column as usize..).unwrap_or_default();
+        let bytes = self.data.get(self.place(column as usize, top as usize)..).unwrap_or_default();
         let row = |down: usize| {
             bytes.get(self.stride.saturating_mul(down)..).and_then(|rest| rest.first_chunk::<TILE_COLUMNS>())
         };
@@ -202,23 +206,25 @@ impl<'a> Source<'a> {
             return false;
         }
         let (left, top) = ((low[0] >> PLACE_SHIFT) as usize, (low[1] >> PLACE_SHIFT) as usize);
-        let (right, bottom) = ((high[0] >> PLACE_SHIFT) as usize + 1, (high[1] >> PLACE_SHIFT) as usize + 1);
-        if right - left >= TILE_COLUMNS || bottom - top >= TILE_ROWS {
+        let (right, bottom) = ((high[0] >> PLACE_SHIFT) as usize, (high[1] >> PLACE_SHIFT) as usize);
+        // The neighbours to the right and below belong to it.
+        if right.wrapping_sub(left) >= TILE_COLUMNS - 1 || bottom.wrapping_sub(top) >= TILE_ROWS - 1 {
             return false;
         }
         // The room behind lets the neighbours of any pixel be read without a check.
         let mut tile = [0; TILE_COLUMNS * TILE_ROWS + TILE_COLUMNS + 2];
         // Always all rows: a branch on how many are needed would be guessed wrong too often.
-        for (row, to) in (top..).zip(tile.as_chunks_mut::<TILE_COLUMNS>().0.iter_mut().take(TILE_ROWS)) {
-            let row = row.min(self.last[1] as usize);
-            let bytes = self.data.get(row * self.stride + left..).and_then(|rest| rest.first_chunk());
+        for (down, to) in (0..TILE_ROWS).zip(tile.as_chunks_mut::<TILE_COLUMNS>().0.iter_mut()) {
+            let row = top.saturating_add(down).min(self.last[1] as usize);
+            let bytes = self.data.get(self.place(left, row)..).and_then(|rest| rest.first_chunk());
             let Some(bytes) = bytes else { return false };
             *to = *bytes;
         }
 
         // Arrays of 16-bit numbers, one step at a time: this becomes vector instructions. Loops, because `map` and `from_fn` become
         // calls where the compiler does not inline all of them. Places in the tile fit 16 bits.
-        let from = [start[0] - ((left as i32) << PLACE_SHIFT), start[1] - ((top as i32) << PLACE_SHIFT)];
+        let from =
+            [start[0].wrapping_sub((left as i32) << PLACE_SHIFT), start[1].wrapping_sub((top as i32) << PLACE_SHIFT)];
         let (mut places, mut firsts) = ([[0u16; STEP]; 2], [0u16; STEP]);
         for (axis, (from, slope)) in places.iter_mut().zip(from.into_iter().zip(slope)) {
             for (place, k) in axis.iter_mut().zip(0u16..) {
@@ -246,6 +252,12 @@ impl<'a> Source<'a> {
         true
     }
 
+    /// Where the byte at a column and row of the picture lies; any place for what is not in it.
+    #[inline(always)]
+    const fn place(&self, column: usize, row: usize) -> usize {
+        row.wrapping_mul(self.stride).wrapping_add(column)
+    }
+
     /// The pixel at any place, `None` outside of the picture.
     pub(super) fn at(&self, [x, y]: [i32; 2]) -> Option<u8> {
         let cell = [x >> PLACE_SHIFT, y >> PLACE_SHIFT];
@@ -258,8 +270,8 @@ impl<'a> Source<'a> {
             return None;
         }
         let pixel = |dx: i32, dy: i32| {
-            let (x, y) = ((cell[0] + dx).min(self.last[0]), (cell[1] + dy).min(self.last[1]));
-            self.data.get(y as usize * self.stride + x as usize).map(|p| u16::from(*p))
+            let at = |i: usize, more: i32| cell[i].saturating_add(more).min(self.last[i]) as usize;
+            self.data.get(self.place(at(0, dx), at(1, dy))).map(|p| u16::from(*p))
         };
         Some(blend([pixel(0, 0)?, pixel(1, 0)?], [pixel(0, 1)?, pixel(1, 1)?], across, down))
     }

@@ -41,14 +41,15 @@ impl<const SURFACES: usize> Regions<SURFACES> {
             for y0 in (0..height).step_by(TILE) {
                 for x0 in (0..width).step_by(TILE) {
                     let here = surfaces.first_of_tile(x0, y0);
+                    let first = y0.wrapping_mul(width).wrapping_add(x0);
                     if let Some(above) = y0.checked_sub(1) {
-                        let first = y0 * width + x0;
-                        let border = Border { first, step: 1, length: TILE.min(width - x0), across: width };
+                        let length = TILE.min(width.saturating_sub(x0));
+                        let border = Border { first, step: 1, length, across: width };
                         self.cross(surfaces, picture, &border, (surfaces.first_of_tile(x0, above), here), &takes_part);
                     }
                     if let Some(left) = x0.checked_sub(1) {
-                        let first = y0 * width + x0;
-                        let border = Border { first, step: width, length: TILE.min(height - y0), across: 1 };
+                        let length = TILE.min(height.saturating_sub(y0));
+                        let border = Border { first, step: width, length, across: 1 };
                         self.cross(surfaces, picture, &border, (surfaces.first_of_tile(left, y0), here), &takes_part);
                     }
                 }
@@ -70,7 +71,9 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         let reach = surfaces.settings().step_sixteenths;
         // Neighbours along the border mostly belong to the same two surfaces, which are joined but once.
         let mut last = (0, 0);
-        for behind in (border.first..).step_by(border.step).take(border.length) {
+        for i in 0..border.length {
+            // Within the picture, as its own length says.
+            let behind = border.first.wrapping_add(i.wrapping_mul(border.step));
             let before = behind.saturating_sub(border.across);
             let (Some(&a), Some(&b)) = (labels.get(before), labels.get(behind)) else { return };
             if a == 0 || b == 0 || (a, b) == last {
@@ -81,7 +84,9 @@ impl<const SURFACES: usize> Regions<SURFACES> {
                 continue;
             }
             last = (a, b);
-            let (a, b) = (firsts.0 + usize::from(a) - 1, firsts.1 + usize::from(b) - 1);
+            // Labels count from 1; what lies beyond the table is not looked at.
+            let [a, b] = [(firsts.0, a), (firsts.1, b)]
+                .map(|(first, label)| first.wrapping_add(usize::from(label)).wrapping_sub(1));
             if [a, b].into_iter().all(|place| table.get(place).is_some_and(takes_part)) {
                 self.unite(a, b);
             }
@@ -90,10 +95,8 @@ impl<const SURFACES: usize> Regions<SURFACES> {
 
     /// The regions, each by the surface that stands for it. Surfaces that took no part are regions of their own.
     pub fn roots(&self) -> impl Iterator<Item = usize> {
-        self.parent
-            .iter()
-            .take(self.len)
-            .enumerate()
+        (0..SURFACES)
+            .zip(self.parent.iter().take(self.len))
             .filter(|&(place, &parent)| usize::from(parent) == place)
             .map(|(place, _)| place)
     }

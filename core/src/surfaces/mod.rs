@@ -141,7 +141,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             if needed > capacity { Err(error) } else { Ok(()) }
         };
         capacity("calibration.width x calibration.height", width.saturating_mul(height), PIXELS)?;
-        capacity("tiles of the picture", width.div_ceil(TILE) * height.div_ceil(TILE), SURFACES)?;
+        capacity("tiles of the picture", width.div_ceil(TILE).saturating_mul(height.div_ceil(TILE)), SURFACES)?;
         self.settings = *settings;
         self.least_dot_of_horizontal = libm::cosf(settings.horizontal_deg.to_radians());
         self.most_dot_of_vertical = libm::cosf(settings.vertical_deg.to_radians());
@@ -184,7 +184,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
     pub(crate) fn codes_mut(&mut self) -> &mut [u8] {
         self.tiles.clear();
         self.table.clear();
-        &mut self.labels[..self.width * self.height]
+        self.labels.get_mut(..self.width.saturating_mul(self.height)).unwrap_or_default()
     }
 
     fn find<const DISPARITIES: usize, const CODED: bool>(
@@ -204,7 +204,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             self.chosen,
             Find::<_, _, _, CODED> { stage: self, picture, depth, rays, classes, found: &mut found },
         );
-        SurfaceReport { found, dropped: found - self.table.len() as u32 }
+        SurfaceReport { found, dropped: found.saturating_sub(self.table.len() as u32) }
     }
 
     /// Finds the surfaces and measures them; returns how many there are.
@@ -217,10 +217,11 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         classes: &[SurfaceClass; CODES],
     ) -> u32 {
         let pixels = picture.pixels();
-        let (covered, mut found) = (depth.covered(), 0);
+        let (covered, mut found) = (depth.covered(), 0u32);
         for tile in Tile::all(self.width, self.height) {
             let Self { union, settings, labels, width, .. } = self;
-            found += u32::from(union.label::<CODED>(pixels, *width, tile, settings, &covered, labels));
+            found =
+                found.saturating_add(u32::from(union.label::<CODED>(pixels, *width, tile, settings, &covered, labels)));
         }
         let mut keep = KeepRule::everything();
         if found as usize > SURFACES {
@@ -251,10 +252,9 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         if x >= self.width || y >= self.height {
             return None;
         }
-        let label = usize::from(*self.labels.get(y * self.width + x)?);
-        let tile = y / TILE * self.width.div_ceil(TILE) + x / TILE;
-        let first = usize::from(*self.tiles.get(tile)?);
-        label.checked_sub(1).map(|label| first + label)
+        let label = usize::from(*self.labels.get(y.wrapping_mul(self.width).wrapping_add(x))?);
+        let first = usize::from(*self.tiles.get(self.tile_at(x, y))?);
+        label.checked_sub(1).and_then(|label| first.checked_add(label))
     }
 
     /// The surface at pixel `(x, y)`.
@@ -264,7 +264,8 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
 
     /// Numbers of the surfaces along row `y` within their tiles, from 1; 0 where there is none.
     pub(crate) fn labels_row(&self, y: usize) -> &[u8] {
-        &self.labels[y * self.width..(y + 1) * self.width]
+        let start = y.saturating_mul(self.width);
+        self.labels.get(start..start.saturating_add(self.width)).unwrap_or_default()
     }
 
     /// [`Self::labels_row`] of all rows, one after the other.
@@ -274,16 +275,20 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
 
     /// Place in the table of the first surface of the tile at `(x, y)`.
     pub(crate) fn first_of_tile(&self, x: usize, y: usize) -> usize {
-        let tile = y / TILE * self.width.div_ceil(TILE) + x / TILE;
-        self.tiles.get(tile).map_or(0, |&first| usize::from(first))
+        self.tiles.get(self.tile_at(x, y)).map_or(0, |&first| usize::from(first))
     }
 
     /// The surfaces of the tile at `(x, y)`, in the order of their numbers.
     pub(crate) fn of_tile(&self, x: usize, y: usize) -> &[Surface] {
-        let tile = y / TILE * self.width.div_ceil(TILE) + x / TILE;
+        let tile = self.tile_at(x, y);
         let Some(&first) = self.tiles.get(tile) else { return &[] };
-        let end = self.tiles.get(tile + 1).map_or(self.table.len(), |&end| usize::from(end));
+        let end = self.tiles.get(tile.wrapping_add(1)).map_or(self.table.len(), |&end| usize::from(end));
         self.table.get(usize::from(first)..end).unwrap_or_default()
+    }
+
+    /// The number of the tile at `(x, y)`, row by row.
+    const fn tile_at(&self, x: usize, y: usize) -> usize {
+        (y / TILE).wrapping_mul(self.width.div_ceil(TILE)).wrapping_add(x / TILE)
     }
 
     /// Width and height of the pictures.
@@ -303,25 +308,26 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         by_size.fill(0);
         for tile in Tile::all(self.width, self.height) {
             let mut pixels = [0u16; MAX_SURFACES];
-            for y in tile.y..tile.y + tile.height {
-                for &label in &self.labels[y * self.width + tile.x..][..tile.width] {
+            for y in 0..tile.height {
+                for &label in self.labels.get(tile.row(y, self.width)).unwrap_or_default() {
                     let label = if CODED { label & NUMBER_MASK } else { label };
                     if let Some(pixels) = usize::from(label).checked_sub(1).and_then(|i| pixels.get_mut(i)) {
-                        *pixels += 1;
+                        *pixels = pixels.wrapping_add(1);
                     }
                 }
             }
             for &pixels in pixels.iter().filter(|&&pixels| pixels > 0) {
-                let count = &mut by_size[usize::from(pixels) - 1];
-                *count = count.saturating_add(1);
+                if let Some(count) = usize::from(pixels).checked_sub(1).and_then(|i| by_size.get_mut(i)) {
+                    *count = count.saturating_add(1);
+                }
             }
         }
         let mut room = SURFACES;
         for (i, &count) in by_size.iter().enumerate().rev() {
-            if usize::from(count) > room {
-                return KeepRule { at_least: i as u16 + 1, of_smallest: room as u16 };
-            }
-            room -= usize::from(count);
+            let Some(left) = room.checked_sub(usize::from(count)) else {
+                return KeepRule { at_least: (i as u16).wrapping_add(1), of_smallest: room as u16 };
+            };
+            room = left;
         }
         KeepRule::everything()
     }
@@ -329,8 +335,8 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
     /// Takes the codes out of the labels of one tile; returns the classes of its surfaces.
     fn take_classes(&mut self, tile: Tile, classes: &[SurfaceClass; CODES]) -> [SurfaceClass; MAX_SURFACES] {
         let mut given = [SurfaceClass::Undefined; MAX_SURFACES];
-        for y in tile.y..tile.y + tile.height {
-            for label in &mut self.labels[y * self.width + tile.x..][..tile.width] {
+        for y in 0..tile.height {
+            for label in self.labels.get_mut(tile.row(y, self.width)).unwrap_or_default() {
                 let code = usize::from(*label >> CODE_SHIFT);
                 *label &= NUMBER_MASK;
                 if let Some(class) = usize::from(*label).checked_sub(1).and_then(|i| given.get_mut(i)) {
@@ -353,7 +359,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         given: Option<&[SurfaceClass; MAX_SURFACES]>,
     ) {
         let stride = self.width;
-        let row = |y: usize| (tile.y + y) * stride + tile.x..(tile.y + y) * stride + tile.x + tile.width;
+        let row = |y: usize| tile.row(y, stride);
         // The farthest point of a surface decides how many bits its distances can keep; it has the smallest disparity.
         let mut farthest = [u16::MAX; MAX_SURFACES];
         let mut count = 0;
@@ -368,12 +374,13 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             }
         }
         for ((farthest, shift), moments) in farthest.iter().zip(&mut self.shifts).zip(&mut self.moments).take(count) {
-            *shift = (u32::BITS - depth.inverse(*farthest).leading_zeros()).saturating_sub(16) as u8;
+            // The bits beyond the lowest 16 that are used.
+            *shift = 16u32.saturating_sub(depth.inverse(*farthest).leading_zeros()) as u8;
             *moments = Moments::ZERO;
         }
         let middle = (TILE / 2) as i32;
         for y in 0..tile.height {
-            let v = y as i32 - middle;
+            let v = (y as i32).wrapping_sub(middle);
             let labels = self.labels.get(row(y)).unwrap_or_default();
             if labels.iter().all(|&label| label == 0) {
                 continue;
@@ -388,16 +395,16 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         }
         let mut renumbered = [0u8; MAX_SURFACES];
         let (mut kept, mut left_out) = (0u8, false);
-        let (u, v) = ((tile.x + TILE / 2) as f32, (tile.y + TILE / 2) as f32);
+        let [u, v] = [tile.x, tile.y].map(|first| first.wrapping_add(TILE / 2) as f32);
         for (i, number) in renumbered.iter_mut().enumerate().take(count) {
-            let moments = &self.moments[i];
-            let unit_m = depth.scale_m() * (1u32 << self.shifts[i]) as f32;
+            let (moments, shift) = (&self.moments[i], u32::from(self.shifts[i]));
+            let unit_m = depth.scale_m() * (1u32 << (shift & 31)) as f32;
             let mut surface = self.classify(moments.scatter(rays, u, v, unit_m));
             if let Some(&class) = given.and_then(|given| given.get(i)) {
                 surface.class = class;
             }
             if keep.keeps(moments.pixels()) && self.table.push(surface).is_ok() {
-                kept += 1;
+                kept = kept.wrapping_add(1);
                 *number = kept;
             } else {
                 left_out = true;
@@ -405,7 +412,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         }
         if left_out {
             for y in 0..tile.height {
-                for label in &mut self.labels[row(y)] {
+                for label in self.labels.get_mut(row(y)).unwrap_or_default() {
                     *label = usize::from(*label).checked_sub(1).and_then(|i| renumbered.get(i)).copied().unwrap_or(0);
                 }
             }

@@ -1,6 +1,6 @@
 //! Exact sums over the points of one surface.
 
-use core::ops::Range;
+use core::{num::Wrapping, ops::Range};
 
 use super::TILE;
 use crate::{
@@ -12,31 +12,37 @@ use crate::{
 /// tile's middle. A point is `(z, z u, z v)` seen along three fixed directions, so these ten sums hold its mean and
 /// covariance in any frame.
 ///
-/// Within a tile of 32 x 32 no sum exceeds 2^50, and no product in [`Self::scatter`] exceeds 2^60: all are exact.
+/// Within a tile of 32 x 32 no sum exceeds 2^50, and no product in [`Self::scatter`] exceeds 2^60: all are exact, and nothing wraps
+/// that is written so.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Moments {
-    n: i64,
-    z: i64,
-    zu: i64,
-    zv: i64,
-    zz: i64,
-    zzu: i64,
-    zzv: i64,
-    zzuu: i64,
-    zzuv: i64,
-    zzvv: i64,
+    n: Sum,
+    z: Sum,
+    zu: Sum,
+    zv: Sum,
+    zz: Sum,
+    zzu: Sum,
+    zzv: Sum,
+    zzuu: Sum,
+    zzuv: Sum,
+    zzvv: Sum,
 }
 
 /// Sums over pixels of one row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct RowMoments {
-    n: i64,
-    z: i64,
-    zu: i64,
-    zz: i64,
-    zzu: i64,
-    zzuu: i64,
+    n: Sum,
+    z: Sum,
+    zu: Sum,
+    zz: Sum,
+    zzu: Sum,
+    zzuu: Sum,
 }
+
+/// A sum with its sign.
+type Sum = Wrapping<i64>;
+
+const NOTHING: Sum = Wrapping(0);
 
 /// From so many pixels on a run is summed up side by side with the rest of its row.
 const LONG_RUN: usize = 10;
@@ -46,8 +52,10 @@ impl RowMoments {
     #[inline(always)]
     pub(super) fn of_run(z: &[u32; TILE], run: Range<usize>, shift: u32) -> Self {
         const MIDDLE: i64 = (TILE / 2) as i64;
+        const WIDE: Sum = Wrapping(MIDDLE);
         let Range { start, end } = run;
-        if run.len() < LONG_RUN {
+        let length = run.len();
+        if length < LONG_RUN {
             let z = z.get(run).unwrap_or_default().iter().map(|z| z >> (shift & 31));
             return Self::of(z, end as i32 - MIDDLE as i32);
         }
@@ -55,7 +63,7 @@ impl RowMoments {
         let (mut z0, mut z1) = (0u32, 0u32);
         let mut squares = [0u32; TILE];
         for ((z, square), column) in z.iter().zip(&mut squares).zip(0u32..) {
-            let belongs = column.wrapping_sub(start as u32) < (end - start) as u32;
+            let belongs = column.wrapping_sub(start as u32) < length as u32;
             let z = if belongs { z >> (shift & 31) } else { 0 };
             z0 = z0.wrapping_add(z);
             z1 = z1.wrapping_add(z.wrapping_mul(column));
@@ -64,18 +72,18 @@ impl RowMoments {
         let (mut q0, mut q1, mut q2) = (0u64, 0u64, 0u64);
         for (&square, column) in squares.iter().zip(0u32..) {
             q0 = q0.wrapping_add(u64::from(square));
-            q1 = q1.wrapping_add(u64::from(square) * u64::from(column));
-            q2 = q2.wrapping_add(u64::from(square) * u64::from(column * column));
+            q1 = q1.wrapping_add(u64::from(square).wrapping_mul(column.into()));
+            q2 = q2.wrapping_add(u64::from(square).wrapping_mul(column.wrapping_mul(column).into()));
         }
-        let (z0, z1) = (i64::from(z0), i64::from(z1));
-        let [q0, q1, q2] = [q0, q1, q2].map(|sum| sum as i64);
+        let (z0, z1) = (Wrapping(i64::from(z0)), Wrapping(i64::from(z1)));
+        let [q0, q1, q2] = [q0, q1, q2].map(|sum| Wrapping(sum as i64));
         Self {
-            n: (end - start) as i64,
+            n: Wrapping(length as i64),
             z: z0,
-            zu: z1 - MIDDLE * z0,
+            zu: z1 - WIDE * z0,
             zz: q0,
-            zzu: q1 - MIDDLE * q0,
-            zzuu: q2 - 2 * MIDDLE * q1 + MIDDLE * MIDDLE * q0,
+            zzu: q1 - WIDE * q0,
+            zzuu: q2 - Wrapping(2 * MIDDLE) * q1 + Wrapping(MIDDLE * MIDDLE) * q0,
         }
     }
 
@@ -90,34 +98,45 @@ impl RowMoments {
         let (mut q0, mut q1, mut q2) = (0u64, 0u64, 0u64);
         for z in z {
             let square = u64::from(z.wrapping_mul(z));
-            n += 1;
+            n = n.wrapping_add(1);
             z0 = z0.wrapping_add(z);
             z1 = z1.wrapping_add(z0);
             q0 = q0.wrapping_add(square);
             q1 = q1.wrapping_add(q0);
             q2 = q2.wrapping_add(q1);
         }
-        let end = i64::from(end);
-        let (z0, z1) = (i64::from(z0), i64::from(z1));
-        let [q0, q1, q2] = [q0, q1, q2].map(|sum| sum as i64);
+        let (end, two) = (Wrapping(i64::from(end)), Wrapping(2));
+        let (z0, z1) = (Wrapping(i64::from(z0)), Wrapping(i64::from(z1)));
+        let [q0, q1, q2] = [q0, q1, q2].map(|sum| Wrapping(sum as i64));
         Self {
-            n: i64::from(n),
+            n: Wrapping(i64::from(n)),
             z: z0,
             zu: end * z0 - z1,
             zz: q0,
             zzu: end * q0 - q1,
-            zzuu: end * (end * q0 - 2 * q1) + (2 * q2 - q1),
+            zzuu: end * (end * q0 - two * q1) + (two * q2 - q1),
         }
     }
 }
 
 impl Moments {
-    pub(super) const ZERO: Self = Self { n: 0, z: 0, zu: 0, zv: 0, zz: 0, zzu: 0, zzv: 0, zzuu: 0, zzuv: 0, zzvv: 0 };
+    pub(super) const ZERO: Self = Self {
+        n: NOTHING,
+        z: NOTHING,
+        zu: NOTHING,
+        zv: NOTHING,
+        zz: NOTHING,
+        zzu: NOTHING,
+        zzv: NOTHING,
+        zzuu: NOTHING,
+        zzuv: NOTHING,
+        zzvv: NOTHING,
+    };
 
     /// Adds a row.
     #[inline(always)]
     pub(super) fn add(&mut self, row: &RowMoments, v: i32) {
-        let v = i64::from(v);
+        let v = Wrapping(i64::from(v));
         self.n += row.n;
         self.z += row.z;
         self.zu += row.zu;
@@ -132,15 +151,15 @@ impl Moments {
 
     /// Number of pixels.
     pub(super) fn pixels(&self) -> u16 {
-        self.n as u16
+        self.n.0 as u16
     }
 
     /// Mean and covariance in the vehicle frame, for a tile whose middle lies at pixel `(u, v)`, with `unit_m` metres to a
     /// unit of `z`.
     pub(super) fn scatter(&self, rays: &Rays, u: f32, v: f32, unit_m: f32) -> Scatter {
-        let n = self.n.max(1);
-        let central = |sum: i64, a: i64, b: i64| (n * sum - a * b) as f32;
-        let square = unit_m * unit_m / (n * n) as f32;
+        let n = self.n.max(Wrapping(1));
+        let central = |sum: Sum, a: Sum, b: Sum| (n * sum - a * b).0 as f32;
+        let square = unit_m * unit_m / (n * n).0 as f32;
         // Covariance of (z, zu, zv).
         let c = [
             [central(self.zz, self.z, self.z), central(self.zzu, self.z, self.zu), central(self.zzv, self.z, self.zv)],
@@ -149,7 +168,7 @@ impl Moments {
         ];
         let c = |i: usize, j: usize| square * if i <= j { c[i][j] } else { c[j][i] };
         let axes = [rays.direction(u, v), rays.along_row, rays.along_column];
-        let mean = [self.z, self.zu, self.zv].map(|sum| sum as f32 * (unit_m / n as f32));
+        let mean = [self.z, self.zu, self.zv].map(|sum| sum.0 as f32 * (unit_m / n.0 as f32));
         let entry = |a: usize, b: usize| {
             let mut sum = 0.0;
             for i in 0..3 {
@@ -160,7 +179,7 @@ impl Moments {
             sum
         };
         Scatter {
-            weight: n as f32,
+            weight: n.0 as f32,
             mean_m: core::array::from_fn(|a| {
                 rays.origin_m[a] + axes[0][a] * mean[0] + axes[1][a] * mean[1] + axes[2][a] * mean[2]
             }),
@@ -208,10 +227,10 @@ mod tests {
             let sum = |term: fn(i64, i64) -> i64| -> i64 {
                 row.iter().zip(first..end).map(|(&z, u)| term(i64::from(z), i64::from(u))).sum()
             };
-            assert_eq!(found.n, row.len() as i64);
-            assert_eq!((found.z, found.zu), (sum(|z, _| z), sum(|z, u| z * u)));
+            assert_eq!(found.n.0, row.len() as i64);
+            assert_eq!((found.z.0, found.zu.0), (sum(|z, _| z), sum(|z, u| z * u)));
             let expected = (sum(|z, _| z * z), sum(|z, u| z * z * u), sum(|z, u| z * z * u * u));
-            assert_eq!((found.zz, found.zzu, found.zzuu), expected, "{first}..{end}: {row:?}");
+            assert_eq!((found.zz.0, found.zzu.0, found.zzuu.0), expected, "{first}..{end}: {row:?}");
         }
     }
 }

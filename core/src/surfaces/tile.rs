@@ -42,14 +42,23 @@ impl Tile {
             (0..width).step_by(TILE).map(move |x| Self {
                 x,
                 y,
-                width: TILE.min(width - x),
-                height: TILE.min(height - y),
+                width: TILE.min(width.saturating_sub(x)),
+                height: TILE.min(height.saturating_sub(y)),
             })
         })
+    }
+
+    /// Where row `y` of the tile lies in a picture with rows of `stride`.
+    #[inline(always)]
+    pub(super) const fn row(&self, y: usize, stride: usize) -> Range<usize> {
+        let start = self.y.wrapping_add(y).wrapping_mul(stride).wrapping_add(self.x);
+        start..start.wrapping_add(self.width)
     }
 }
 
 /// Union-find over the runs of contiguous pixels of one tile, row by row; at worst each pixel is a run.
+///
+/// Every number of a run is less than [`AREA`]: the remainders change nothing and say so to the compiler.
 pub(super) struct TileUnion {
     parent: [u16; AREA],
     /// Pixels of the run; of the whole surface where the run stands for it.
@@ -83,29 +92,29 @@ impl TileUnion {
         let (rows, runs) = self.join_runs::<CODED>(picture, stride, tile, settings, covered, labels);
         // What stands for a surface comes first in it.
         for run in 0..runs {
-            let root = self.parent[usize::from(self.parent[run])];
+            let run = run % AREA;
+            let root = self.parent[usize::from(self.parent[run]) % AREA];
             self.parent[run] = root;
             if usize::from(root) != run {
-                self.pixels[usize::from(root)] += self.pixels[run];
+                let pixels = self.pixels[run];
+                let all = &mut self.pixels[usize::from(root) % AREA];
+                *all = all.wrapping_add(pixels);
             }
         }
         // The count of a surface makes room for its number as soon as the number is known.
         let most = if CODED { usize::from(NUMBER_MASK) } else { MAX_SURFACES };
         let mut found = 0u8;
-        let mut run = 0;
+        let mut run = 0usize;
         for (y, links) in rows.iter().enumerate().take(tile.height) {
-            let Some(labels) = labels.get_mut((tile.y + y) * stride + tile.x..).and_then(|l| l.get_mut(..tile.width))
-            else {
-                break;
-            };
+            let Some(labels) = labels.get_mut(tile.row(y, stride)) else { break };
             let mut numbers = [0u8; TILE];
             for bit in each_bit(links.starts()) {
-                let root = usize::from(self.parent[run % AREA]);
-                run += 1;
+                let root = usize::from(self.parent[run % AREA]) % AREA;
+                run = run.wrapping_add(1);
                 let pixels = &mut self.pixels[root];
                 if *pixels & NUMBERED == 0 {
                     let enough = *pixels >= settings.min_pixels && usize::from(found) < most;
-                    found += u8::from(enough);
+                    found = found.wrapping_add(u8::from(enough));
                     *pixels = NUMBERED | if enough { u16::from(found) } else { 0 };
                 }
                 let mut number = (*pixels & !NUMBERED) as u8;
@@ -116,7 +125,8 @@ impl TileUnion {
                 if CODED {
                     number |= labels.get(first).map_or(0, |code| code << CODE_SHIFT);
                 }
-                numbers.iter_mut().skip(first).take(length(links.left, first)).for_each(|to| *to = number);
+                let run = numbers.get_mut(first..).unwrap_or_default().iter_mut().take(length(links.left, first));
+                run.for_each(|to| *to = number);
             }
             if let Some(whole) = labels.first_chunk_mut() {
                 *whole = numbers;
@@ -145,15 +155,14 @@ impl TileUnion {
         // The first run of the row above, and the number of runs so far.
         let (mut first_above, mut runs) = (0usize, 0usize);
         for (y, row) in rows.iter_mut().enumerate().take(tile.height) {
-            let from = (tile.y + y) * stride + tile.x;
-            let here = piece(picture.get(from..from + tile.width).unwrap_or_default(), 0);
+            let here = piece(picture.get(tile.row(y, stride)).unwrap_or_default(), 0);
             let mut links = Links::of(&here, 0, covered, step);
             let mut up = links.value & links_above.value & near(&here, &above, step);
             if CODED {
                 let mut codes = [0; TILE];
                 codes
                     .iter_mut()
-                    .zip(labels.get(from..from + tile.width).unwrap_or_default())
+                    .zip(labels.get(tile.row(y, stride)).unwrap_or_default())
                     .for_each(|(to, from)| *to = *from);
                 links.left &= same(&codes, &shifted(&codes, 0));
                 up &= same(&codes, &codes_above);
@@ -167,13 +176,14 @@ impl TileUnion {
             // Where both runs go on, so does what is known of them.
             for bit in each_bit(up & !(up << 1 & links.left & links_above.left)) {
                 let upto = bit | (bit - 1);
-                let run = runs + (starts & upto).count_ones() as usize;
-                let run_above = first_above + (links_above.starts() & upto).count_ones() as usize;
+                let begun = |starts: u32| (starts & upto).count_ones() as usize;
+                let (run, run_above) =
+                    (runs.wrapping_add(begun(starts)), first_above.wrapping_add(begun(links_above.starts())));
                 // Both began, as their pixels belong to them.
-                self.join(run - 1, run_above - 1);
+                self.join(run.wrapping_sub(1), run_above.wrapping_sub(1));
             }
             first_above = runs;
-            runs += starts.count_ones() as usize;
+            runs = runs.wrapping_add(starts.count_ones() as usize);
             (above, links_above, *row) = (here, links, links);
         }
         (rows, runs)
@@ -187,26 +197,28 @@ impl TileUnion {
     #[inline(always)]
     fn root(&mut self, mut place: usize) -> usize {
         loop {
-            let parent = usize::from(self.parent[place]);
+            let here = place % AREA;
+            let parent = usize::from(self.parent[here]);
             if parent == place {
                 return place;
             }
-            self.parent[place] = self.parent[parent];
-            place = usize::from(self.parent[place]);
+            let above = self.parent[parent % AREA];
+            self.parent[here] = above;
+            place = usize::from(above);
         }
     }
 
     #[inline(always)]
     fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b)] = a.min(b) as u16;
+        self.parent[a.max(b) % AREA] = a.min(b) as u16;
     }
 }
 
 /// Pixels of the run that begins at pixel `first`: with it all that hang together with their left neighbour.
 #[inline(always)]
 const fn length(left: u32, first: usize) -> usize {
-    1 + (left >> first >> 1).trailing_ones() as usize
+    ((left >> first >> 1).trailing_ones() as usize).wrapping_add(1)
 }
 
 /// Marks the count of a surface that has become its number.

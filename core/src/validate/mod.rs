@@ -116,12 +116,13 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
     #[inline(always)]
     fn go_through(&mut self, picture: &mut [DisparityPixel]) {
         let mut open = 0;
-        for y in 0..picture.len() / self.width {
+        for y in 0..picture.len().checked_div(self.width).unwrap_or(0) {
             let (runs, used) = self.join_row(picture, y, open);
             open = self.end_row(picture, runs, used);
         }
         for place in 0..open {
-            self.take_out(picture, self.next[place]);
+            let Some(&surface) = self.next.get(place) else { break };
+            self.take_out(picture, surface);
         }
     }
 
@@ -131,9 +132,12 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
     fn join_row(&mut self, picture: &[DisparityPixel], y: usize, open: usize) -> (usize, usize) {
         let Self { settings, width, above, here, table, links: kept, .. } = self;
         let ValidateSettings { step_sixteenths: step, min_surface_px: limit } = *settings;
-        let row = picture.get(y * *width..(y + 1) * *width).unwrap_or_default();
-        let before = y.checked_sub(1).and_then(|y| picture.get(y * *width..(y + 1) * *width));
-        let row_above = before.unwrap_or_default();
+        let row_at = |y: usize| {
+            let start = y.wrapping_mul(*width);
+            picture.get(start..start.wrapping_add(*width)).unwrap_or_default()
+        };
+        let row = row_at(y);
+        let row_above = y.checked_sub(1).map(row_at).unwrap_or_default();
         let mut run = Run { table: table.as_flattened_mut(), used: open, limit, label: NONE, first: (0, 0), from: 0 };
         // Runs that began, here and above, pixels with a value that went by, and whether the last pixel of the piece before hangs
         // together with the one above it.
@@ -158,21 +162,22 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
             let joins = up & !((up << 1 | up_before) & links.left & links_above.left);
             for bit in each_bit(starts | joins) {
                 if starts & bit != 0 {
-                    let went_by = values + (links.value & (bit - 1)).count_ones();
+                    let went_by = values.wrapping_add((links.value & (bit - 1)).count_ones());
                     if let Some(label) = runs.checked_sub(1).and_then(|before| here.get_mut(before)) {
                         *label = run.end(went_by);
                     }
-                    run.begin((x as u32 + bit.trailing_zeros(), y), went_by);
-                    runs += 1;
+                    run.begin(((x as u32).wrapping_add(bit.trailing_zeros()), y), went_by);
+                    runs = runs.wrapping_add(1);
                 }
                 if joins & bit != 0 {
-                    let began_above = runs_above + (starts_above & (bit | (bit - 1))).count_ones();
+                    let began_above = runs_above.wrapping_add((starts_above & (bit | (bit - 1))).count_ones());
                     // It began, as the pixel above belongs to it.
-                    run.join(above.get(began_above as usize - 1).copied().unwrap_or(NONE));
+                    run.join(above.get((began_above as usize).wrapping_sub(1)).copied().unwrap_or(NONE));
                 }
             }
-            runs_above += starts_above.count_ones();
-            values += links.value.count_ones();
+            // No more than there are pixels in a row.
+            runs_above = runs_above.wrapping_add(starts_above.count_ones());
+            values = values.wrapping_add(links.value.count_ones());
             up_before = up >> (PIECE - 1);
         }
         if let Some(label) = runs.checked_sub(1).and_then(|before| here.get_mut(before)) {
@@ -185,30 +190,36 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
     /// how many there are.
     #[inline(always)]
     fn end_row(&mut self, picture: &mut [DisparityPixel], runs: usize, used: usize) -> usize {
-        let mut open = 0;
+        // Labels are places in the table, which has room for the runs of two rows: nothing that is looked up below is missing.
+        let mut open = 0usize;
         {
             let Self { above, here, table, next, renumbered, .. } = self;
             let table = table.as_flattened_mut();
             let renumbered = renumbered.as_flattened_mut();
-            renumbered[..used].fill(NONE);
+            renumbered.get_mut(..used).unwrap_or_default().fill(NONE);
             for (&here, above) in here.iter().zip(above.iter_mut()).take(runs) {
                 let root = usize::from(root(table, here));
-                if renumbered[root] == NONE {
-                    renumbered[root] = open as u16;
-                    next[open] = Open { parent: open as u16, ..table[root] };
-                    open += 1;
+                let (Some(number), Some(surface)) = (renumbered.get_mut(root), table.get(root)) else { continue };
+                if *number == NONE
+                    && let Some(next) = next.get_mut(open)
+                {
+                    *number = open as u16;
+                    *next = Open { parent: open as u16, ..*surface };
+                    open = open.wrapping_add(1);
                 }
-                *above = renumbered[root];
+                *above = *number;
             }
         }
         for place in 0..used {
-            let surface = self.table.as_flattened()[place];
-            let ended = usize::from(surface.parent) == place && self.renumbered.as_flattened()[place] == NONE;
-            if ended {
+            let (table, numbers) = (self.table.as_flattened(), self.renumbered.as_flattened());
+            let (Some(&surface), Some(&number)) = (table.get(place), numbers.get(place)) else { break };
+            if usize::from(surface.parent) == place && number == NONE {
                 self.take_out(picture, surface);
             }
         }
-        self.table.as_flattened_mut()[..open].copy_from_slice(&self.next[..open]);
+        if let (Some(to), Some(from)) = (self.table.as_flattened_mut().get_mut(..open), self.next.get(..open)) {
+            to.copy_from_slice(from);
+        }
         open
     }
 
@@ -223,7 +234,9 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         let walk = &mut self.walk;
         walk.clear();
         let mut visit = |walk: &mut Vec<Step, MAX_SURFACE_PX>, x: usize, y: usize, from: Option<u16>| {
-            let Some(pixel) = picture.get_mut(y * width + x).filter(|_| x < width) else { return };
+            let Some(pixel) = picture.get_mut(y.wrapping_mul(width).wrapping_add(x)).filter(|_| x < width) else {
+                return;
+            };
             let steps = pixel.steps();
             if steps != 0 && from.is_none_or(|from| steps.abs_diff(from) <= reach) {
                 // There is room: the surface has fewer pixels than the smallest that is kept, and each is visited once.
@@ -300,25 +313,32 @@ impl Run<'_> {
     fn end(&mut self, to: u32) -> u16 {
         if self.label == NONE {
             self.label = self.used as u16;
-            self.table[self.used] = Open { parent: self.label, pixels: 0, seed: self.first };
-            self.used += 1;
+            // There is room: no row has more runs than pixels, and the surfaces of the row above are not more either.
+            if let Some(entry) = self.table.get_mut(self.used) {
+                *entry = Open { parent: self.label, pixels: 0, seed: self.first };
+            }
+            self.used = self.used.wrapping_add(1);
         }
-        let pixels = &mut self.table[usize::from(self.label)].pixels;
-        *pixels = (u32::from(*pixels) + (to - self.from)).min(u32::from(self.limit)) as u16;
+        if let Some(Open { pixels, .. }) = self.table.get_mut(usize::from(self.label)) {
+            let more = to.wrapping_sub(self.from);
+            *pixels = u32::from(*pixels).wrapping_add(more).min(u32::from(self.limit)) as u16;
+        }
         self.label
     }
 }
 
-/// The entry that stands for the surface of entry `label`; halves the path on the way.
+/// The entry that stands for the surface of entry `label`; halves the path on the way. What is not in the table stands for itself.
 #[inline(always)]
 fn root(table: &mut [Open], mut label: u16) -> u16 {
     loop {
-        let parent = table[usize::from(label)].parent;
-        if parent == label {
+        let Some(parent) = table.get(usize::from(label)).map(|entry| entry.parent).filter(|&parent| parent != label)
+        else {
             return label;
+        };
+        let Some(grandparent) = table.get(usize::from(parent)).map(|entry| entry.parent) else { return label };
+        if let Some(entry) = table.get_mut(usize::from(label)) {
+            entry.parent = grandparent;
         }
-        let grandparent = table[usize::from(parent)].parent;
-        table[usize::from(label)].parent = grandparent;
         label = grandparent;
     }
 }
@@ -329,11 +349,14 @@ fn join(table: &mut [Open], a: u16, b: u16, limit: u16) -> u16 {
     let (a, b) = (root(table, a), root(table, b));
     // The older entry wins, so that labels of the row above stay valid the longest.
     let (keep, give) = if a < b { (a, b) } else { (b, a) };
-    if keep != give {
-        let pixels = table[usize::from(give)].pixels;
-        table[usize::from(give)].parent = keep;
-        let sum = &mut table[usize::from(keep)].pixels;
-        *sum = (*sum + pixels).min(limit);
+    if keep != give
+        && let Some(given) = table.get_mut(usize::from(give))
+    {
+        given.parent = keep;
+        let pixels = given.pixels;
+        if let Some(kept) = table.get_mut(usize::from(keep)) {
+            kept.pixels = kept.pixels.saturating_add(pixels).min(limit);
+        }
     }
     keep
 }

@@ -46,12 +46,12 @@ unsafe fn begin_costs<V: Vector>(search: &Search, columns: &[u8], costs: *mut i1
     unsafe {
         for first in (0..search.stride).step_by(V::LANES) {
             let mut sums = [V::Wide::splat(i16::MIN); 2];
-            for x in search.range.start - search.radius - 1..search.range.start + search.radius {
-                let [low, high] = V::load(columns.as_ptr().add(x * search.stride + first)).widen();
+            for x in search.window_before() {
+                let [low, high] = V::load(columns.as_ptr().add(x.wrapping_mul(search.stride)).add(first)).widen();
                 sums = [sums[0].add(low), sums[1].add(high)];
             }
             for half in 0..2 {
-                let place = first + half * V::Wide::LANES;
+                let place = first.wrapping_add(half * V::Wide::LANES);
                 let inside = outside_is_nothing::<V>(sums[half], place, &(0..search.disparities));
                 // Sums of bytes under a window are all below this.
                 inside.min(V::Wide::splat(NO_COST)).store(costs.add(place));
@@ -74,17 +74,17 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
     // SAFETY: that of this function.
     unsafe {
         let stride = search.stride;
-        let enter = columns.as_ptr().add((x + search.radius) * stride);
-        let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+        let enter = columns.as_ptr().add(search.entering(x).wrapping_mul(stride));
+        let leave = columns.as_ptr().add(search.leaving(x).wrapping_mul(stride));
         let candidates = if BORDER { search.candidates(x) } else { 0..search.disparities };
         let nothing = V::Wide::splat(i16::MAX);
         let places = V::Wide::load(PLACES.as_ptr());
-        let top = V::Wide::splat((search.min_disparity + search.disparities - 1) as i16);
+        let top = V::Wide::splat(search.top() as i16);
         let mut least = nothing;
         for first in (0..stride).step_by(V::LANES) {
             let (enter, leave) = (V::load(enter.add(first)).widen(), V::load(leave.add(first)).widen());
             for half in 0..2 {
-                let place = first + half * V::Wide::LANES;
+                let place = first.wrapping_add(half * V::Wide::LANES);
                 let cost = V::Wide::load(costs.add(place)).add(enter[half].sub(leave[half]));
                 cost.store(costs.add(place));
                 if BORDER && is_outside::<V>(place, &candidates) {
@@ -93,7 +93,7 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
                 let cost = if BORDER { outside_is_nothing::<V>(cost, place, &candidates) } else { cost };
                 least = least.min(cost);
                 if let Some([best, disparities]) = tables {
-                    let (best, disparities) = (best.add(x + place), disparities.add(x + place));
+                    let (best, disparities) = (best.add(x).add(place), disparities.add(x).add(place));
                     let (before, told) = (V::Wide::load(best), V::Wide::load(disparities));
                     let offered = top.sub(V::Wide::splat(place as i16)).sub(places);
                     before.min(cost).store(best);
@@ -105,7 +105,7 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
             return;
         }
         let cost = least.least();
-        let above = search.above(cost, found.weak(x - search.range.start));
+        let above = search.above(cost, found.weak(search.nth(x)));
         let bound = V::Wide::splat(above);
         let best = V::Wide::splat(cost);
         let mut near = V::Wide::none();
@@ -121,10 +121,10 @@ unsafe fn cost_pixel<V: Vector, const BORDER: bool>(
             let here = places.add(V::Wide::splat(place as i16));
             first = first.min(here.select(best.equal(cost), nothing));
         }
-        let place = first.least() as usize % stride;
+        let place = first.least() as usize % stride.max(1);
         // There is room on both sides.
-        let beside = [*costs.add(place).sub(1), cost, *costs.add(place + 1)];
-        found.put(x - search.range.start, place, beside, V::Wide::total(near), above);
+        let beside = [*costs.add(place).sub(1), cost, *costs.add(place).add(1)];
+        found.put(search.nth(x), place, beside, V::Wide::total(near), above);
     }
 }
 
@@ -144,14 +144,14 @@ unsafe fn cost_run<V: Vector, const BLOCKS: usize>(
     unsafe {
         let stride = BLOCKS * V::LANES;
         for x in search.range.clone() {
-            let enter = columns.as_ptr().add((x + search.radius) * stride);
-            let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+            let enter = columns.as_ptr().add(search.entering(x).wrapping_mul(stride));
+            let leave = columns.as_ptr().add(search.leaving(x).wrapping_mul(stride));
             let mut least = V::Wide::splat(i16::MAX);
             for block in 0..BLOCKS {
                 let first = block * V::LANES;
                 let change = V::load(enter.add(first)).sub(V::load(leave.add(first))).widen_signed();
                 for half in 0..2 {
-                    let place = first + half * V::Wide::LANES;
+                    let place = first.wrapping_add(half * V::Wide::LANES);
                     let cost = V::Wide::load(costs.add(place)).add(change[half]);
                     cost.store(costs.add(place));
                     // The 32768 that costs are less by falls out at the top.
@@ -159,18 +159,19 @@ unsafe fn cost_run<V: Vector, const BLOCKS: usize>(
                 }
             }
             let key = least.least();
-            let place = (key & 15) as usize * V::Wide::LANES + V::Wide::first(least.equal(V::Wide::splat(key)));
+            let first = V::Wide::first(least.equal(V::Wide::splat(key)));
+            let place = ((key & 15) as usize).wrapping_mul(V::Wide::LANES).wrapping_add(first);
             let best = (key >> 4).wrapping_add(i16::MIN);
-            let above = search.above(best, found.weak(x - search.range.start));
+            let above = search.above(best, found.weak(search.nth(x)));
             let bound = V::Wide::splat(above);
             let mut near = V::Wide::none();
             for half in 0..2 * BLOCKS {
                 near = V::Wide::count(near, bound.greater(V::Wide::load(costs.add(half * V::Wide::LANES))));
             }
             // There is room on both sides.
-            let beside = [*costs.add(place).sub(1), best, *costs.add(place + 1)];
+            let beside = [*costs.add(place).sub(1), best, *costs.add(place).add(1)];
             let near = V::Wide::total(near);
-            found.put(x - search.range.start, place, beside, near, above);
+            found.put(search.nth(x), place, beside, near, above);
         }
     }
 }

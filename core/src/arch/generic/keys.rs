@@ -50,11 +50,11 @@ unsafe fn begin_keys<V: Vector>(search: &Search, columns: &[u8], keys: *mut i16)
             let places = V::Wide::load(PLACES.as_ptr()).add(V::Wide::splat((first as i16).wrapping_add(i16::MIN)));
             let mut sums = [places, places.add(V::Wide::splat(V::Wide::LANES as i16))];
             let inside = [end.greater(sums[0]), end.greater(sums[1])];
-            for x in search.range.start - search.radius - 1..search.range.start + search.radius {
-                sums = V::load(columns.as_ptr().add(x * search.stride + first)).add_shifted(sums);
+            for x in search.window_before() {
+                sums = V::load(columns.as_ptr().add(x.wrapping_mul(search.stride)).add(first)).add_shifted(sums);
             }
             for half in 0..2 {
-                sums[half].select(inside[half], nothing).store(keys.add(first + half * V::Wide::LANES));
+                sums[half].select(inside[half], nothing).store(keys.add(first).add(half * V::Wide::LANES));
             }
         }
     }
@@ -75,24 +75,28 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
     // SAFETY: that of this function.
     unsafe {
         let stride = search.stride;
-        let enter = columns.as_ptr().add((x + search.radius) * stride);
-        let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+        let enter = columns.as_ptr().add(search.entering(x).wrapping_mul(stride));
+        let leave = columns.as_ptr().add(search.leaving(x).wrapping_mul(stride));
         let candidates = if BORDER { search.candidates(x) } else { 0..search.disparities };
         let nothing = V::Wide::splat(i16::MAX);
         let turn = V::Wide::splat(0x7f);
         let table = tables[x % 2].add(x);
         for first in (0..stride).step_by(V::LANES) {
             let change = V::load(enter.add(first)).sub(V::load(leave.add(first)));
-            let before = [V::Wide::load(keys.add(first)), V::Wide::load(keys.add(first + V::Wide::LANES))];
+            let before = [V::Wide::load(keys.add(first)), V::Wide::load(keys.add(first).add(V::Wide::LANES))];
             let after = change.add_shifted(before);
             after[0].store(keys.add(first));
-            after[1].store(keys.add(first + V::Wide::LANES));
+            after[1].store(keys.add(first).add(V::Wide::LANES));
         }
         if BORDER && candidates.is_empty() {
             return;
         }
         // Vectors without candidates are passed over.
-        let places = candidates.start / V::Wide::LANES * V::Wide::LANES..if BORDER { candidates.end } else { stride };
+        let places = (candidates.start / V::Wide::LANES).wrapping_mul(V::Wide::LANES)..if BORDER {
+            candidates.end
+        } else {
+            stride
+        };
         let mut least = nothing;
         for place in places.clone().step_by(V::Wide::LANES) {
             let key = V::Wide::load(keys.add(place));
@@ -102,7 +106,7 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
         }
         let least = least.least();
         let place = (least & 0x7f) as usize;
-        let above = limits.above(least, found.weak(x - search.range.start));
+        let above = limits.above(least, found.weak(search.nth(x)));
         let bound = V::Wide::splat(above);
         let mut near = V::Wide::none();
         for place in places.step_by(V::Wide::LANES) {
@@ -111,8 +115,8 @@ unsafe fn key_pixel<V: Vector, const BORDER: bool>(
             near = V::Wide::count(near, bound.greater(key));
         }
         // There is room on both sides.
-        let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
-        found.put(x - search.range.start, place, beside, V::Wide::total(near), above);
+        let beside = [*keys.add(place).sub(1), least, *keys.add(place).add(1)];
+        found.put(search.nth(x), place, beside, V::Wide::total(near), above);
     }
 }
 
@@ -144,8 +148,8 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
             }
         }
         for x in range {
-            let enter = columns.as_ptr().add((x + search.radius) * stride);
-            let leave = columns.as_ptr().add((x - search.radius - 1) * stride);
+            let enter = columns.as_ptr().add(search.entering(x).wrapping_mul(stride));
+            let leave = columns.as_ptr().add(search.leaving(x).wrapping_mul(stride));
             let table = tables[x % 2].add(x);
             let mut least = V::Wide::splat(i16::MAX);
             for block in 0..BLOCKS {
@@ -167,7 +171,7 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
             }
             let least = least.least();
             let place = (least & 0x7f) as usize;
-            let above = limits.above(least, found.weak(x - search.range.start));
+            let above = limits.above(least, found.weak(search.nth(x)));
             let bound = V::Wide::splat(above);
             let mut near = V::Wide::none();
             for block in 0..BLOCKS {
@@ -178,8 +182,8 @@ unsafe fn key_run<V: Vector, const BLOCKS: usize>(
                 }
             }
             // There is room on both sides.
-            let beside = [*keys.add(place).sub(1), least, *keys.add(place + 1)];
-            found.put(x - search.range.start, place, beside, V::Wide::total(near), above);
+            let beside = [*keys.add(place).sub(1), least, *keys.add(place).add(1)];
+            found.put(search.nth(x), place, beside, V::Wide::total(near), above);
         }
     }
 }

@@ -223,15 +223,16 @@ unsafe fn mask<V: Vector>(place: usize, first: usize, end: usize) -> V {
 #[inline(always)]
 fn search_fits<V: Vector>(search: &Search, columns: &[u8], work: &[i16], right: Option<&Right<'_>>) -> bool {
     let Search { range, radius, stride, disparities, .. } = search;
-    let columns_needed = (range.end + radius).saturating_mul(*stride);
-    let lead = search.min_disparity + disparities - 1;
+    let columns_needed = range.end.saturating_add(*radius).saturating_mul(*stride);
+    let lead = search.top();
+    let partners = range.end.saturating_add(*stride);
     let fits = stride.is_multiple_of(V::LANES)
         && stride >= disparities
         && range.start > *radius
         && range.len() <= CHUNK
         && columns.len() >= columns_needed
-        && work.len() >= stride + 2 * PAD
-        && right.is_none_or(|right| right.lead == lead && right.tables.iter().all(|t| t.len() >= range.end + stride));
+        && work.len() >= stride.saturating_add(2 * PAD)
+        && right.is_none_or(|right| right.lead == lead && right.tables.iter().all(|t| t.len() >= partners));
     debug_assert!(fits, "the plan of the matcher sees to it that everything fits");
     fits
 }
@@ -239,7 +240,7 @@ fn search_fits<V: Vector>(search: &Search, columns: &[u8], work: &[i16], right: 
 /// Whether a vector from `place` on has no candidates.
 #[inline(always)]
 fn is_outside<V: Vector>(place: usize, candidates: &Range<usize>) -> bool {
-    place + V::Wide::LANES <= candidates.start || place >= candidates.end
+    place.wrapping_add(V::Wide::LANES) <= candidates.start || place >= candidates.end
 }
 
 /// # Safety
@@ -248,12 +249,12 @@ fn is_outside<V: Vector>(place: usize, candidates: &Range<usize>) -> bool {
 unsafe fn outside_is_nothing<V: Vector>(number: V::Wide, place: usize, candidates: &Range<usize>) -> V::Wide {
     // SAFETY: that of this function.
     unsafe {
-        if place >= candidates.start && place + V::Wide::LANES <= candidates.end {
+        if place >= candidates.start && place.wrapping_add(V::Wide::LANES) <= candidates.end {
             return number;
         }
         let nothing = V::Wide::splat(i16::MAX);
         let places = V::Wide::load(PLACES.as_ptr()).add(V::Wide::splat(place as i16));
-        let from = places.greater(V::Wide::splat(candidates.start as i16 - 1));
+        let from = places.greater(V::Wide::splat((candidates.start as i16).wrapping_sub(1)));
         let to = V::Wide::splat(candidates.end as i16).greater(places);
         number.select(from, nothing).select(to, nothing)
     }

@@ -9,12 +9,13 @@ use crate::arch::jobs::{CodeRow, SlideCodes};
 pub(in crate::arch) unsafe fn slide_codes<V: Vector>(job: SlideCodes<'_>) {
     let width = job.enter.left.len();
     let SlideCodes { columns, stride, disparities, min_disparity, enter, leave } = job;
-    let Some(back) = (min_disparity + disparities).checked_sub(1) else { return };
+    let Some(back) = min_disparity.saturating_add(disparities).checked_sub(1) else { return };
     let holds = |row: &CodeRow<'_>| {
-        let needed = (row.lead + width + stride).saturating_sub(back);
+        let needed = row.lead.saturating_sub(back).saturating_add(width).saturating_add(stride);
         row.left.len() >= width && row.lead >= back && row.low.len() >= needed && row.high.len() >= needed
     };
-    let fits = stride.is_multiple_of(V::LANES) && stride >= disparities && stride - disparities < V::LANES;
+    let fits =
+        stride.is_multiple_of(V::LANES) && stride >= disparities && stride.saturating_sub(disparities) < V::LANES;
     let whole = width.checked_mul(stride).is_some_and(|sums| columns.len() >= sums);
     if !fits || !whole || !holds(&enter) || leave.as_ref().is_some_and(|leave| !holds(leave)) {
         debug_assert!(false, "the plan of the matcher sees to it that everything fits");
@@ -47,29 +48,29 @@ unsafe fn slide<V: Vector, const LEAVES: bool, const BLOCKS: usize>(
     unsafe {
         let (enter, leave) = (Codes::new(enter, back), Codes::new(leave, back));
         let stride = if BLOCKS == 0 { stride } else { BLOCKS * V::LANES };
-        let last = stride - V::LANES;
+        let last = stride.wrapping_sub(V::LANES);
         let tail = mask::<V>(last, 0, disparities);
         let columns = columns.as_mut_ptr();
         for x in 0..width.min(back) {
             let codes = [V::code(*enter.left.add(x)), V::code(*leave.left.add(x))];
-            let column = columns.add(x * stride);
+            let column = columns.add(x.wrapping_mul(stride));
             // What lies in front of the row must leave no trace.
-            let mut place = 0;
+            let mut place = 0usize;
             while place < stride {
-                let change = change::<V, LEAVES>(codes, &enter, &leave, x + place);
-                let change = change.and(mask::<V>(place, back - x, disparities));
+                let change = change::<V, LEAVES>(codes, &enter, &leave, x.wrapping_add(place));
+                let change = change.and(mask::<V>(place, back.wrapping_sub(x), disparities));
                 V::load(column.add(place)).add(change).store(column.add(place));
-                place += V::LANES;
+                place = place.wrapping_add(V::LANES);
             }
         }
         for x in back..width {
             let codes = [V::code(*enter.left.add(x)), V::code(*leave.left.add(x))];
-            let column = columns.add(x * stride);
+            let column = columns.add(x.wrapping_mul(stride));
             if 0 < BLOCKS && BLOCKS <= V::KEPT {
                 // All is read before anything is written: two vectors in one instruction, where there is one.
                 let mut changes = [change::<V, LEAVES>(codes, &enter, &leave, x); BLOCKS];
                 for block in 1..BLOCKS {
-                    changes[block] = change::<V, LEAVES>(codes, &enter, &leave, x + block * V::LANES);
+                    changes[block] = change::<V, LEAVES>(codes, &enter, &leave, x.wrapping_add(block * V::LANES));
                 }
                 changes[BLOCKS - 1] = changes[BLOCKS - 1].and(tail);
                 for block in 0..BLOCKS {
@@ -80,13 +81,13 @@ unsafe fn slide<V: Vector, const LEAVES: bool, const BLOCKS: usize>(
                 }
                 continue;
             }
-            let mut place = 0;
+            let mut place = 0usize;
             while place < last {
-                let change = change::<V, LEAVES>(codes, &enter, &leave, x + place);
+                let change = change::<V, LEAVES>(codes, &enter, &leave, x.wrapping_add(place));
                 V::load(column.add(place)).add(change).store(column.add(place));
-                place += V::LANES;
+                place = place.wrapping_add(V::LANES);
             }
-            let change = change::<V, LEAVES>(codes, &enter, &leave, x + last).and(tail);
+            let change = change::<V, LEAVES>(codes, &enter, &leave, x.wrapping_add(last)).and(tail);
             V::load(column.add(last)).add(change).store(column.add(last));
         }
     }
@@ -104,7 +105,7 @@ impl Codes {
     /// `back` must not exceed the lead.
     #[inline(always)]
     unsafe fn new(row: CodeRow<'_>, back: usize) -> Self {
-        let base = row.lead - back;
+        let base = row.lead.wrapping_sub(back);
         // SAFETY: both rows are longer than the lead.
         unsafe { Self { left: row.left.as_ptr(), low: row.low.as_ptr().add(base), high: row.high.as_ptr().add(base) } }
     }

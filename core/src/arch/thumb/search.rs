@@ -45,15 +45,15 @@ struct Pixel {
 #[inline(never)]
 pub(in crate::arch) fn search_keys(job: KeyJob<'_>) {
     let KeyJob { search, limits, columns, work, right, found } = job;
-    let lead = search.min_disparity + search.disparities - 1;
-    let fits = right.lead == lead && right.tables.iter().all(|t| t.len() >= search.range.end + search.stride);
+    let partners = search.range.end.saturating_add(search.stride);
+    let fits = right.lead == search.top() && right.tables.iter().all(|t| t.len() >= partners);
     let Some(costs) = Costs::new(search, columns, work).filter(|_| fits) else {
         debug_assert!(false, "the plan of the matcher sees to it that everything fits");
         return;
     };
     let tables = right.tables.map(|table| table.as_mut_ptr());
     let inner = search.inner();
-    for (i, x) in search.range.clone().enumerate() {
+    for (i, x) in (0..CHUNK).zip(search.range.clone()) {
         // SAFETY: `Costs::new` has seen that the columns under the window and the costs lie in their slices, and the tables were seen
         // to hold the places of a column from every pixel of the range on.
         unsafe {
@@ -64,8 +64,9 @@ pub(in crate::arch) fn search_keys(job: KeyJob<'_>) {
             let above = limits.above((least ^ 0x8000) as i16, found.weak(i));
             let bound = above as u16 ^ 0x8000;
             let near = costs.near(&candidates, bound, bound >> 7);
-            let place = usize::from((least & 0x7f) - costs.first_place);
-            let [nearer, farther] = [place.saturating_sub(1), place + 1].map(|place| number(costs.at(place)));
+            let place = usize::from((least & 0x7f).wrapping_sub(costs.first_place));
+            let [nearer, farther] =
+                [place.saturating_sub(1), place.wrapping_add(1)].map(|place| number(costs.at(place)));
             found.put(i, place, [nearer, number(least >> 7), farther], near, above);
         }
     }
@@ -80,7 +81,7 @@ pub(super) fn search_costs(job: CostJob<'_, u8>) {
         return;
     };
     let inner = search.inner();
-    for (i, x) in search.range.clone().enumerate() {
+    for (i, x) in (0..CHUNK).zip(search.range.clone()) {
         // SAFETY: `Costs::new` has seen that the columns under the window and the costs lie in their slices; there is no table.
         unsafe {
             let pixel = Pixel::new(search, columns, x, core::ptr::null_mut());
@@ -91,7 +92,8 @@ pub(super) fn search_costs(job: CostJob<'_, u8>) {
             let bound = above as u16 ^ 0x8000;
             let near = costs.near(&candidates, bound, bound);
             let place = costs.first_of(candidates, least);
-            let [nearer, farther] = [place.saturating_sub(1), place + 1].map(|place| number(costs.at(place)));
+            let [nearer, farther] =
+                [place.saturating_sub(1), place.wrapping_add(1)].map(|place| number(costs.at(place)));
             found.put(i, place, [nearer, number(least), farther], near, above);
         }
     }
@@ -103,8 +105,8 @@ impl Pixel {
     #[inline(always)]
     unsafe fn new(search: &Search, columns: &[u8], x: usize, table: *mut i16) -> Self {
         // SAFETY: that of this function.
-        let column = |x: usize| unsafe { columns.as_ptr().add(x * search.stride).cast::<u32>() };
-        Self { enter: column(x + search.radius), leave: column(x - search.radius - 1), table }
+        let column = |x: usize| unsafe { columns.as_ptr().add(x.wrapping_mul(search.stride)).cast::<u32>() };
+        Self { enter: column(search.entering(x)), leave: column(search.leaving(x)), table }
     }
 }
 
@@ -117,7 +119,7 @@ impl Costs {
             && *stride <= MOST_PLACES
             && range.start > *radius
             && range.len() <= CHUNK
-            && columns.len() >= (range.end + radius).saturating_mul(*stride)
+            && columns.len() >= range.end.saturating_add(*radius).saturating_mul(*stride)
             && columns.as_ptr().addr().is_multiple_of(4);
         if !fits {
             return None;
@@ -129,7 +131,7 @@ impl Costs {
         let costs = Self { records, blocks, first_place: (MOST_PLACES - stride) as u16 };
         if !search.follows {
             // SAFETY: columns up to the first one's window and the costs were just seen to lie in the slices.
-            unsafe { costs.begin(columns, range.start - radius - 1..range.start + radius) };
+            unsafe { costs.begin(columns, search.window_before()) };
         }
         Some(costs)
     }
@@ -141,7 +143,7 @@ impl Costs {
     #[inline(always)]
     const unsafe fn record(&self, block: usize) -> *mut u32 {
         // SAFETY: that of this function.
-        unsafe { self.records.add(RECORD * block) }
+        unsafe { self.records.add(RECORD.wrapping_mul(block)) }
     }
 
     /// Sums columns.
@@ -155,8 +157,8 @@ impl Costs {
             let mut sums = [0u32; 2];
             for x in range.clone() {
                 // SAFETY: that of this function.
-                let four = unsafe { *columns.as_ptr().cast::<u32>().add(x * words + word) };
-                sums = [sums[0] + (four & EVEN), sums[1] + (four >> 8 & EVEN)];
+                let four = unsafe { *columns.as_ptr().cast::<u32>().add(x.wrapping_mul(words)).add(word) };
+                sums = [sums[0].wrapping_add(four & EVEN), sums[1].wrapping_add(four >> 8 & EVEN)];
             }
             // SAFETY: that of this function.
             unsafe { self.record(word / 2).add(word % 2 * 2).cast::<[u32; 2]>().write(sums) };
@@ -172,7 +174,7 @@ impl Costs {
         // SAFETY: that of this function.
         unsafe {
             // Candidates are missing in front near the left edge; only odd spans of valid columns make them end early.
-            let whole = candidates.end == BLOCK * self.blocks;
+            let whole = candidates.end == self.blocks.wrapping_mul(BLOCK);
             let first = if whole { candidates.start.div_ceil(BLOCK) } else { self.blocks };
             for block in 0..first {
                 self.edge_block::<KEYS>(pixel, block, candidates);
@@ -242,7 +244,7 @@ impl Costs {
                 "bne 2b",
                 "3:",
                 record = inout(reg) self.record(from).add(RECORD - 1) => _,
-                left = inout(reg) self.blocks - from => left,
+                left = inout(reg) self.blocks.wrapping_sub(from) => left,
                 numbers = in(reg) numbers,
                 zero = in(reg) 0,
                 minimum = out(reg) _,
@@ -250,7 +252,7 @@ impl Costs {
                 options(nostack, readonly),
             );
         }
-        self.blocks - left
+        self.blocks.wrapping_sub(left)
     }
 
     /// A block of which not all places are candidates.
@@ -263,17 +265,17 @@ impl Costs {
         unsafe {
             let record = self.record(block);
             for half in 0..2 {
-                let word = 2 * block + half;
+                let word = block.wrapping_mul(2).wrapping_add(half);
                 let changes = bytes_less(*pixel.enter.add(word), *pixel.leave.add(word));
                 let costs = record.add(2 * half);
                 *costs = add_even(*costs, changes);
                 *costs.add(1) = add_odd(*costs.add(1), changes);
             }
             *record.add(4) = u32::MAX;
-            let first = BLOCK * block;
-            for place in candidates.start.max(first)..candidates.end.min(first + BLOCK) {
+            let first = block.wrapping_mul(BLOCK);
+            for place in candidates.start.max(first)..candidates.end.min(first.wrapping_add(BLOCK)) {
                 let cost = self.at(place);
-                let number = if KEYS { cost << 7 | (place as u16 + self.first_place) } else { cost };
+                let number = if KEYS { cost << 7 | (place as u16).wrapping_add(self.first_place) } else { cost };
                 *record.add(4) = least(*record.add(4), u32::from(number) | 0xffff_0000);
                 if KEYS {
                     let here = pixel.table.add(place);
@@ -351,12 +353,12 @@ impl Costs {
                 "add {places}, {places}, #0x00040004",
                 "tst {places}, #0x80",
                 "beq 2b",
-                enter = inout(reg) pixel.enter.add(2 * first) => _,
-                leave = inout(reg) pixel.leave.add(2 * first) => _,
+                enter = inout(reg) pixel.enter.add(first).add(first) => _,
+                leave = inout(reg) pixel.leave.add(first).add(first) => _,
                 record = inout(reg) self.record(first) => _,
-                table = inout(reg) pixel.table.add(BLOCK * first) => _,
+                table = inout(reg) pixel.table.add(first.wrapping_mul(BLOCK)) => _,
                 // Those of places 0 and 2.
-                places = inout(reg) both(self.first_place + (BLOCK * first) as u16) + 0x0002_0000 => _,
+                places = inout(reg) both(self.first_place.wrapping_add(first.wrapping_mul(BLOCK) as u16)).wrapping_add(0x0002_0000) => _,
                 turn = in(reg) TURN,
                 a = out(reg) _,
                 b = out(reg) _,
@@ -400,10 +402,10 @@ impl Costs {
                 "str {x}, [{record}], #4",
                 "subs {blocks}, {blocks}, #1",
                 "bne 2b",
-                enter = inout(reg) pixel.enter.add(2 * first) => _,
-                leave = inout(reg) pixel.leave.add(2 * first) => _,
+                enter = inout(reg) pixel.enter.add(first).add(first) => _,
+                leave = inout(reg) pixel.leave.add(first).add(first) => _,
                 record = inout(reg) self.record(first) => _,
-                blocks = inout(reg) self.blocks - first => _,
+                blocks = inout(reg) self.blocks.wrapping_sub(first) => _,
                 a = out(reg) _,
                 b = out(reg) _,
                 x = out(reg) _,
@@ -423,7 +425,8 @@ impl Costs {
     #[inline(always)]
     unsafe fn near(&self, candidates: &Range<usize>, number: u16, cost: u16) -> u16 {
         let (numbers, costs) = (both(number), both(cost));
-        let (mut near, mut block) = (0, 0);
+        // Counts of 16 bits, two side by side: no more than there are places.
+        let (mut near, mut block) = (0u32, 0usize);
         while block < self.blocks {
             // SAFETY: that of this function.
             unsafe {
@@ -431,20 +434,21 @@ impl Costs {
                 if block == self.blocks {
                     break;
                 }
-                let first = BLOCK * block;
-                if first >= candidates.start && first + BLOCK <= candidates.end {
+                let first = block.wrapping_mul(BLOCK);
+                if first >= candidates.start && first.wrapping_add(BLOCK) <= candidates.end {
                     let record = self.record(block);
-                    near += below(*record, costs) + below(*record.add(1), costs);
-                    near += below(*record.add(2), costs) + below(*record.add(3), costs);
+                    for word in 0..4 {
+                        near = near.wrapping_add(below(*record.add(word), costs));
+                    }
                 } else {
-                    let inside = candidates.start.max(first)..candidates.end.min(first + BLOCK);
-                    near += inside.map(|place| u32::from(self.at(place) < cost)).sum::<u32>();
+                    let inside = candidates.start.max(first)..candidates.end.min(first.wrapping_add(BLOCK));
+                    near = inside.fold(near, |near, place| near.wrapping_add(u32::from(self.at(place) < cost)));
                 }
             }
             if (near & 0xffff) + (near >> 16) >= AMBIGUOUS {
                 break;
             }
-            block += 1;
+            block = block.wrapping_add(1);
         }
         ((near & 0xffff) + (near >> 16)) as u16
     }
@@ -462,7 +466,7 @@ impl Costs {
                 least as u16 == cost || (least >> 16) as u16 == cost
             };
             let block = (0..self.blocks).find(holds).unwrap_or(0);
-            let places = candidates.start.max(BLOCK * block)..candidates.end;
+            let places = candidates.start.max(block.wrapping_mul(BLOCK))..candidates.end;
             places.clone().find(|&place| self.at(place) == cost).unwrap_or(places.start)
         }
     }

@@ -13,9 +13,10 @@ const fn bytes(byte: u8) -> u32 {
 pub(in crate::arch) fn slide_codes(job: SlideCodes<'_>) {
     let SlideCodes { columns, stride, disparities, min_disparity, enter, leave } = job;
     let width = enter.left.len();
-    let Some(back) = (min_disparity + disparities).checked_sub(1) else { return };
+    let Some(back) = min_disparity.saturating_add(disparities).checked_sub(1) else { return };
     let holds = |row: &CodeRow<'_>| {
-        row.left.len() >= width && row.lead >= back && row.low.len() + back >= row.lead + width + stride
+        let needed = row.lead.saturating_sub(back).saturating_add(width).saturating_add(stride);
+        row.left.len() >= width && row.lead >= back && row.low.len() >= needed
     };
     let fits = stride == disparities
         && stride.is_multiple_of(BLOCK)
@@ -30,20 +31,22 @@ pub(in crate::arch) fn slide_codes(job: SlideCodes<'_>) {
     }
     // The right code that place 0 of the first column is compared with. What lies in front of the row goes into sums that no search
     // looks at, and out of them again when the row leaves.
-    let right = |row: &CodeRow<'_>| row.low.as_ptr().wrapping_add(row.lead - back);
+    let right = |row: &CodeRow<'_>| row.low.as_ptr().wrapping_add(row.lead.wrapping_sub(back));
     let right_in = right(&enter);
-    let columns = columns.chunks_exact_mut(stride);
+    let mut columns = columns.chunks_exact_mut(stride.max(1));
     match leave {
         Some(leave) => {
             let right_out = right(&leave);
-            for (x, (column, (&left_in, &left_out))) in columns.zip(enter.left.iter().zip(leave.left)).enumerate() {
+            for (x, (&left_in, &left_out)) in (0..width).zip(enter.left.iter().zip(leave.left)) {
+                let Some(column) = columns.next() else { return };
                 let rights = [right_in, right_out].map(|right| right.wrapping_add(x));
                 // SAFETY: the column is a multiple of a block and aligned, and `holds` has seen as many right codes from `x` on.
                 unsafe { slide(column, [bytes(left_in), !bytes(left_out)], rights) };
             }
         }
         None => {
-            for (x, (column, &left_in)) in columns.zip(enter.left).enumerate() {
+            for (x, &left_in) in (0..width).zip(enter.left) {
+                let Some(column) = columns.next() else { return };
                 // SAFETY: `holds` has seen a column's right codes from `x` on.
                 let right_in = unsafe { core::slice::from_raw_parts(right_in.add(x), stride) };
                 for (sums, right_in) in column.as_chunks_mut::<4>().0.iter_mut().zip(right_in.as_chunks::<4>().0) {
@@ -136,7 +139,7 @@ unsafe fn slide(column: &mut [u8], codes: [u32; 2], [right_in, right_out]: [*con
 /// Bits of each byte.
 #[inline(always)]
 const fn ones(bits: u32) -> u32 {
-    let pairs = bits - ((bits >> 1) & bytes(0x55));
+    let pairs = bits.wrapping_sub((bits >> 1) & bytes(0x55));
     let fours = (pairs & bytes(0x33)) + ((pairs >> 2) & bytes(0x33));
     (fours & bytes(0x0f)) + ((fours >> 4) & bytes(0x0f))
 }

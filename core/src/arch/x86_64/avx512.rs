@@ -124,7 +124,8 @@ impl Wide for Words32 {
 
     #[inline(always)]
     unsafe fn count(count: u32, mask: __mmask32) -> u32 {
-        count + mask.count_ones()
+        // No more than there are places.
+        count.wrapping_add(mask.count_ones())
     }
 
     #[inline(always)]
