@@ -137,7 +137,8 @@ fn all_but_the_segments_find_what_stands_on_level_ground() {
 fn segments_melt_into_the_ground_that_they_stand_on() {
     let standing = look(&boxes(0.0), DetectorKind::DisparitySegments);
     let false_cells = standing.cells(CellState::Obstacle).into_iter().filter(|at| off_boxes(*at) > 1.0).count();
-    assert!(false_cells > 100, "{false_cells} obstacle cells on bare ground");
+    // Nearly all of the ground that has pixels enough.
+    assert!(false_cells > 80, "{false_cells} obstacle cells on bare ground");
     assert!(standing.cells(CellState::Free).len() < 20 && standing.found.ground.is_none());
 
     // The same boxes, without disparities where they touch the ground.

@@ -121,7 +121,9 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
                 Collect { settings, obstacle_heights_m, evidence, common, surfaces, picture, view, ground },
             );
         }
-        self.finish(picture, view, ground, ground_seen, map, |_, cell| cell);
+        self.fill(picture, view, ground, ground_seen, map, |_, cell| cell);
+        smear::take_out(map, view.place, &self.settings);
+        shadow::mark(map, view.place);
     }
 
     /// Begins a map for which nothing was seen.
@@ -153,8 +155,22 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         }
     }
 
-    /// Fills `map` by what was said since [`Self::begin`]; `verdict` has the last word on each cell.
+    /// Fills `map` by what was said since [`Self::begin`]; `verdict` has the last word on each cell. What the window smears stays in: the
+    /// paper's earlier detectors count it.
     pub(crate) fn finish<const DISPARITIES: usize>(
+        &self,
+        picture: DisparityPicture<'_>,
+        view: &View<'_, DISPARITIES>,
+        ground: &Terrain,
+        ground_seen: bool,
+        map: &mut ObstacleMap<CELLS>,
+        verdict: impl Fn(&Evidence, Cell) -> Cell,
+    ) {
+        self.fill(picture, view, ground, ground_seen, map, verdict);
+        shadow::mark(map, view.place);
+    }
+
+    fn fill<const DISPARITIES: usize>(
         &self,
         picture: DisparityPicture<'_>,
         view: &View<'_, DISPARITIES>,
@@ -171,8 +187,6 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             // Cannot fail: `configure` made sure that there is room.
             let _ = map.cells.push(verdict(evidence, cell));
         }
-        smear::take_out(map, view.place, &self.settings);
-        shadow::mark(map, view.place);
     }
 
     /// What the votes make of a cell.
