@@ -63,12 +63,12 @@ pub(crate) enum Vote {
 /// # Bound
 /// One pass of `width x height` steps, one of `CELLS`.
 pub struct MapBuilder<const CELLS: usize> {
-    settings: MapSettings,
-    obstacle_heights_m: (f32, f32),
-    evidence: [Evidence; CELLS],
+    pub(super) settings: MapSettings,
+    pub(super) obstacle_heights_m: (f32, f32),
+    pub(super) evidence: [Evidence; CELLS],
     /// Of the surfaces of one tile.
-    common: [Common; MAX_TILE_SURFACES],
-    chosen: Chosen,
+    pub(super) common: [Common; MAX_TILE_SURFACES],
+    pub(super) chosen: Chosen,
 }
 
 impl<const CELLS: usize> MapBuilder<CELLS> {
@@ -115,10 +115,10 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         if (picture.width(), picture.height()) == surfaces.size() {
             let Self { settings, obstacle_heights_m, evidence, common, chosen } = self;
             let evidence = &mut evidence[..settings.geometry.len()];
-            let obstacle_heights_m = *obstacle_heights_m;
+            let (obstacle_heights_m, rows) = (*obstacle_heights_m, 0..picture.height());
             arch::compiled(
                 *chosen,
-                Collect { settings, obstacle_heights_m, evidence, common, surfaces, picture, view, ground },
+                Collect { settings, obstacle_heights_m, evidence, common, surfaces, picture, view, ground, rows },
             );
         }
         self.finish(picture, view, ground, ground_seen, map, |_, cell| cell);
