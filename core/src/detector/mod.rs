@@ -8,7 +8,7 @@ mod stage;
 
 pub use bands::Band;
 pub use detection::{DetectError, Detection, Statistics};
-pub use memory::{Capacities, MemoryPart, memory_bytes};
+pub use memory::{Capacities, MemoryPart, band_bytes, memory_bytes};
 pub use stage::{Probe, Stage};
 
 use crate::{
