@@ -1,8 +1,8 @@
-//! Votes collected by several threads, each over tiles of its own. What a cell is told is counted in whole numbers that only grow, up
+//! A map filled by several threads: each collects votes over tiles of its own, and decides on cells of its own. What a cell is told is counted in whole numbers that only grow, up
 //! to where they stay: it does not matter who counted.
 
 use super::{
-    MapBuilder, ObstacleMap, View,
+    Cell, MapBuilder, MapSettings, ObstacleMap, View,
     builder::Evidence,
     votes::{Collect, Common},
 };
@@ -13,8 +13,6 @@ use crate::{
     ground::Terrain,
     surfaces::{MAX_TILE_SURFACES, Surfaces, TILE},
 };
-
-use super::MapSettings;
 
 /// What the pixels of one band say.
 pub(crate) struct Votes<const CELLS: usize> {
@@ -71,13 +69,24 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
                 rows,
             });
             run_all(workers, jobs);
-            for votes in votes {
+            for votes in votes.iter() {
                 for (all, votes) in self.evidence.iter_mut().zip(&votes.evidence).take(cells) {
                     all.add(votes);
                 }
             }
         }
-        self.finish(picture, view, ground, ground_seen, map, |_, cell| cell);
+        // As `finish`: each cell is decided on by itself.
+        map.geometry = self.settings.geometry;
+        map.cells.clear();
+        // Cannot fail: `configure` made sure that there is room.
+        let _ = map.cells.resize(cells, Cell::default());
+        let (builder, mut rest) = (&*self, map.cells.as_mut_slice());
+        let jobs = cut(cells, votes.len() + 1, 1).map(|range| {
+            let cells = rest.split_off_mut(..range.len()).unwrap_or_default();
+            DecideBand { builder, picture, view, ground, ground_seen, first: range.start, cells }
+        });
+        run_all(workers, jobs);
+        self.compare_cells(view.place, map);
     }
 }
 
@@ -123,5 +132,26 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Work
             rows: rows.clone(),
         };
         arch::compiled(*chosen, collect);
+    }
+}
+
+/// Decides on some of the cells.
+struct DecideBand<'a, const CELLS: usize, const DISPARITIES: usize> {
+    builder: &'a MapBuilder<CELLS>,
+    picture: DisparityPicture<'a>,
+    view: &'a View<'a, DISPARITIES>,
+    ground: &'a Terrain,
+    ground_seen: bool,
+    /// Place in the table of the first of `cells`.
+    first: usize,
+    cells: &'a mut [Cell],
+}
+
+impl<const CELLS: usize, const DISPARITIES: usize> Work for DecideBand<'_, CELLS, DISPARITIES> {
+    fn work(&mut self) {
+        let Self { builder, picture, view, ground, ground_seen, first, cells } = self;
+        for (index, cell) in (*first..).zip(cells.iter_mut()) {
+            *cell = builder.decide(index, *picture, view, ground, *ground_seen);
+        }
     }
 }

@@ -170,12 +170,17 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
             // Cannot fail: `configure` made sure that there is room.
             let _ = map.cells.push(verdict(&self.evidence[index], cell));
         }
-        smear::take_out(map, view.place, &self.settings);
-        shadow::mark(map, view.place);
+        self.compare_cells(view.place, map);
+    }
+
+    /// Looks at the cells of a map beside each other, when each has been decided on.
+    pub(super) fn compare_cells(&self, place: &Place, map: &mut ObstacleMap<CELLS>) {
+        smear::take_out(map, place, &self.settings);
+        shadow::mark(map, place);
     }
 
     /// What the votes make of a cell.
-    fn decide<const DISPARITIES: usize>(
+    pub(super) fn decide<const DISPARITIES: usize>(
         &self,
         index: usize,
         picture: DisparityPicture<'_>,

@@ -66,8 +66,8 @@ impl<
     /// As [`Self::detect`], with the same result to the bit, by several threads: the picture is cut into one band more than there are
     /// `bands`, at most [`MAX_BANDS`], and `workers` work on them side by side.
     ///
-    /// Rectification, matching, the look at the rows for the health, the validation, the surfaces and the votes of the map are cut;
-    /// the ground, the obstacles and the verdict on the cells are not. `probe` is told of rectification, matching and health as
+    /// Rectification, matching, the look at the rows for the health, the validation, the surfaces, and the votes of the map
+    /// and the cells are cut; the ground and the obstacles are not. `probe` is told of rectification, matching and health as
     /// [`Stage::Match`], since they run at the same time; what other stages take is the time of all threads together.
     ///
     /// # Errors

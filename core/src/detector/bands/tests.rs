@@ -8,9 +8,11 @@ use crate::{
     geometry::{CameraModel, Distortion, Mount, RawPair, RectifiedPair, StereoCalibration},
     matching::{MatchCost, MatchSettings},
     methods::DetectorKind,
+    rectify::grid_nodes,
     settings::Settings,
     test_random::Random,
     validate::ValidateSettings,
+    wire::{Frame, Scan, ScanEncoder, WireConfig},
 };
 
 const WIDTH: usize = 160;
@@ -256,4 +258,62 @@ fn what_cannot_be_looked_at_is_refused_as_without_bands() {
     detector.configure(&settings(), &StereoCalibration::Rectified(pair(64, 48)), &MOUNT).unwrap();
     let refused = detector.detect_in_bands(&picture, &picture, &mut bands, &mut Threads, &mut ()).map(|_| ());
     assert_eq!(refused, Err(DetectError::WrongSize { found: (40, 40), expected: (64, 48) }));
+}
+
+/// Frames of the committed recording, rectified and through a lens: all that is found, and the bytes that go on the bus.
+#[test]
+fn the_recording_says_the_same_on_the_bus_in_bands() {
+    const WIDTH: usize = 320;
+    const HEIGHT: usize = 240;
+    const CELLS: usize = 2500;
+    type Recorded = Detector<{ WIDTH * HEIGHT }, WIDTH, 48, { grid_nodes(WIDTH, HEIGHT) }, 400, 64, CELLS>;
+    let read = |side: usize, frame: usize| -> Vec<u8> {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/recordings/trail");
+        let path = folder.join(std::format!("image_{side}/{frame:06}.png"));
+        let file = std::fs::File::open(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap();
+        let mut pixels = std::vec![0; WIDTH * HEIGHT];
+        reader.next_frame(&mut pixels).unwrap();
+        pixels
+    };
+    let frames: Vec<_> = (0..4).map(|frame| [read(0, frame), read(1, frame)]).collect();
+    let mut settings = Settings::default();
+    settings.matching.disparities = 48;
+    let rectified = RectifiedPair { focal_px: 262.5, cx: 159.5, cy: 119.5, baseline_m: 0.12, ..pair(WIDTH, HEIGHT) };
+    for calibration in [StereoCalibration::Rectified(rectified), StereoCalibration::Raw(raw(WIDTH, HEIGHT))] {
+        let look = |count: usize| -> Vec<String> {
+            let mut encoder = ScanEncoder::<CELLS>::new(WireConfig::default()).unwrap();
+            let mut detector = Box::new(Recorded::new());
+            let mount = Mount { height_m: Some(1.1), ..MOUNT };
+            detector.configure(&settings, &calibration, &mount).unwrap();
+            let mut bands: Vec<Band<WIDTH, 48, CELLS>> = (1..count).map(|_| Band::new()).collect();
+            let mut say = |(index, [left, right]): (usize, &[Vec<u8>; 2])| {
+                let [left, right] = [left, right].map(|bytes| Picture::packed(bytes, WIDTH, HEIGHT).unwrap());
+                match count {
+                    0 => detector.detect(&left, &right, &mut ()),
+                    _ => detector.detect_in_bands(&left, &right, &mut bands, &mut Threads, &mut ()),
+                }
+                .unwrap();
+                let found = detector.detection();
+                let scan = Scan {
+                    scan_index: index as u16,
+                    age_ns: 0,
+                    health: found.health,
+                    geometry: &found.map.geometry,
+                    cells: &found.map.cells,
+                    sectors: &found.sectors,
+                    ground: found.ground.as_ref(),
+                };
+                let mut payloads = Box::new(heapless::Vec::<Frame, 600>::new());
+                encoder.encode(&scan, payloads.as_mut_view()).unwrap();
+                let pixels: Vec<u16> = detector.disparity().pixels().iter().map(|pixel| pixel.bits()).collect();
+                std::format!("{found:?} {pixels:?} {:?} {payloads:?}", detector.surfaces().table())
+            };
+            frames.iter().enumerate().map(&mut say).collect()
+        };
+        let expected = look(0);
+        for count in 1..=5 {
+            assert!(look(count) == expected, "{count} bands are not one");
+        }
+    }
 }
