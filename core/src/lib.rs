@@ -18,6 +18,7 @@
 extern crate std;
 
 pub mod arch;
+pub mod bands;
 pub mod detector;
 pub mod disparity;
 pub mod error;

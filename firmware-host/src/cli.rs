@@ -6,7 +6,7 @@ use clap::{
     Args, Parser, Subcommand, ValueEnum,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
-use fencepost_core::{arch::Backend, methods::DetectorKind};
+use fencepost_core::{arch::Backend, bands::MAX_BANDS, methods::DetectorKind};
 
 use crate::{compare::Method, live::MAX_PAIRS, words};
 
@@ -173,6 +173,9 @@ pub struct BenchArgs {
     /// Pairs that are worked on side by side, each by a thread with a detector of its own.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=MAX_PAIRS as i64))]
     pub threads: u8,
+    /// Bands that each picture is cut into, each worked on by a thread of its own. No result depends on it.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=MAX_BANDS as i64))]
+    pub bands: u8,
     /// Whose instructions the matching is made of: plain, sse2, sse4.1, avx2, avx512 or neon; the fastest that the processor has
     /// if left out. No result depends on it.
     #[arg(long, value_name = "NAME", value_parser = backend)]

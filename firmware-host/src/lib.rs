@@ -26,6 +26,7 @@ pub mod commands;
 pub mod compare;
 pub mod config;
 pub mod console;
+mod crew;
 pub mod detector;
 pub mod error;
 pub mod listen;

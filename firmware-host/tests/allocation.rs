@@ -57,14 +57,16 @@ impl Camera for Counting {
 /// Both in one: tests that run side by side would count each other's memory.
 #[test]
 fn frames_take_no_memory_and_it_is_noticed_if_they_do() {
-    let before_and_after = run(10_000, false);
-    assert_eq!(before_and_after.allocations, 0, "something was allocated");
-    assert_eq!(before_and_after.reallocations, 0, "something was allocated anew");
-    assert!(run(50, true).allocations >= 50, "what was planted is not seen");
+    for threads_per_pair in [1, 3] {
+        let before_and_after = run(10_000, threads_per_pair, false);
+        assert_eq!(before_and_after.allocations, 0, "something was allocated with {threads_per_pair} threads");
+        assert_eq!(before_and_after.reallocations, 0, "something was allocated anew with {threads_per_pair} threads");
+    }
+    assert!(run(50, 1, true).allocations >= 50, "what was planted is not seen");
 }
 
 /// Runs the loop for `frames` pairs after it is warm, and tells what was allocated meanwhile.
-fn run(frames: u32, planted: bool) -> Stats {
+fn run(frames: u32, threads_per_pair: u8, planted: bool) -> Stats {
     let options = SceneOptions { width: 96, height: 72, focal_px: 79.0, frames: 20, ..SceneOptions::default() };
     let memory = MemoryCamera::fill(&mut Scene::new(options).unwrap().into_camera());
     let counts = Arc::new(Mutex::new([None; 2]));
@@ -85,7 +87,7 @@ fn run(frames: u32, planted: bool) -> Stats {
     let (node, mut listener) = (bus.attach(), bus.attach());
     let stop = AtomicBool::new(false);
     let done = AtomicBool::new(false);
-    let settings = RunSettings { priority: 0, lock_memory: false, ..RunSettings::default() };
+    let settings = RunSettings { priority: 0, lock_memory: false, threads_per_pair, ..RunSettings::default() };
     let plan = Plan { pairs: vec![pair], wire: WireConfig::default(), settings, sector_width_deg: 5.0 };
     let (report, heard) = std::thread::scope(|scope| {
         let listening = scope.spawn(|| {

@@ -71,10 +71,23 @@ fn threads_work_side_by_side() {
 }
 
 #[test]
+fn a_picture_is_cut_into_bands() {
+    let size = ["--size", "96x64", "--disparities", "32", "--frames", "3"];
+    let (one, three) = (figures(&size), figures(&[&size[..], &["--bands", "3", "--threads", "2"]].concat()));
+    assert_eq!((&one["bands"], &three["bands"]), (&1.into(), &3.into()));
+    assert_eq!((&three["threads"], &three["frames"]), (&2.into(), &6.into()));
+    let capacities = fencepost_core::detector::Capacities::for_pictures(96, 64, 32);
+    let more = three["memory_bytes"].as_u64().unwrap() - one["memory_bytes"].as_u64().unwrap();
+    assert_eq!(more, 2 * fencepost_core::detector::band_bytes(&capacities) as u64);
+    assert!(three["stages"]["match"].as_f64().unwrap() > 0.0 && three["stages"]["rectify"] == 0.0, "{three:#}");
+}
+
+#[test]
 fn what_cannot_be_measured_is_said() {
     let bench = |arguments: &[&str]| fencepost().arg("bench").args(arguments).assert();
     bench(&["--size", "640"]).code(2).stderr(contains("give width and height"));
     bench(&["--threads", "5"]).code(2).stderr(contains("1..=4"));
+    bench(&["--bands", "9"]).code(2).stderr(contains("1..=8"));
     bench(&["--frames", "0"]).code(2);
     bench(&["--recording", "/nowhere"]).code(1).stderr(contains("/nowhere"));
     bench(&["--size", "4096x64", "--frames", "1"]).code(1).stderr(contains("2048 px width"));

@@ -5,9 +5,9 @@ use crate::{
     arch::Chosen,
     disparity::DisparityPicture,
     error::ConfigError,
-    geometry::DepthTable,
-    ground::{GroundFinder, GroundPlane},
-    map::{Evidence, MapBuilder, View},
+    geometry::{DepthTable, Rays},
+    ground::{GroundFinder, GroundPlane, Terrain},
+    map::{Evidence, MapBuilder, ObstacleMap, View},
     methods::{
         COST_MAP_CLASSES, ConfidenceSettings, CostMap, DetectorKind, Detectors, DisparitySegments,
         GROUND_DEVIATION_CLASSES, GroundDeviation, OtherMap, PIXEL_NORMAL_CLASSES, PixelNormals,
@@ -41,6 +41,59 @@ pub(super) struct Interpreter<
     segments: DisparitySegments,
     pixel_normals: PixelNormals<WIDTH>,
     other: OtherMap<CELLS>,
+}
+
+/// Who does the stages that can be cut into bands.
+pub(super) trait Hands<const CELLS: usize> {
+    /// Finds the surfaces: [`Surfaces::run`].
+    fn find_surfaces<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
+        &mut self,
+        surfaces: &mut Surfaces<PIXELS, SURFACES>,
+        picture: DisparityPicture<'_>,
+        depth: &DepthTable<DISPARITIES>,
+        rays: &Rays,
+    ) -> SurfaceReport;
+
+    /// Fills the map: [`MapBuilder::run`].
+    #[expect(clippy::too_many_arguments, reason = "those of `MapBuilder::run`")]
+    fn fill_map<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
+        &mut self,
+        builder: &mut MapBuilder<CELLS>,
+        surfaces: &Surfaces<PIXELS, SURFACES>,
+        picture: DisparityPicture<'_>,
+        view: &View<'_, DISPARITIES>,
+        terrain: &Terrain,
+        ground_seen: bool,
+        map: &mut ObstacleMap<CELLS>,
+    );
+}
+
+/// The thread that calls.
+pub(super) struct Alone;
+
+impl<const CELLS: usize> Hands<CELLS> for Alone {
+    fn find_surfaces<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
+        &mut self,
+        surfaces: &mut Surfaces<PIXELS, SURFACES>,
+        picture: DisparityPicture<'_>,
+        depth: &DepthTable<DISPARITIES>,
+        rays: &Rays,
+    ) -> SurfaceReport {
+        surfaces.run(picture, depth, rays)
+    }
+
+    fn fill_map<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
+        &mut self,
+        builder: &mut MapBuilder<CELLS>,
+        surfaces: &Surfaces<PIXELS, SURFACES>,
+        picture: DisparityPicture<'_>,
+        view: &View<'_, DISPARITIES>,
+        terrain: &Terrain,
+        ground_seen: bool,
+        map: &mut ObstacleMap<CELLS>,
+    ) {
+        builder.run(surfaces, picture, view, terrain, ground_seen, map);
+    }
 }
 
 /// Which of the two detectors of a frame runs.
@@ -133,15 +186,16 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
         picture: DisparityPicture<'_>,
         setup: &Setup,
         detection: &mut Detection<OBSTACLES, CELLS>,
+        hands: &mut impl Hands<CELLS>,
         probe: &mut impl Probe,
     ) {
         let cross_check = self.detectors.cross_check();
         if let Some(kind) = cross_check {
-            self.find(kind, Turn::Check, picture, setup, detection, probe);
+            self.find(kind, Turn::Check, picture, setup, detection, hands, probe);
             self.other.keep(&detection.map);
             detection.clear();
         }
-        let report = self.find(self.detectors.main(), Turn::Main, picture, setup, detection, probe);
+        let report = self.find(self.detectors.main(), Turn::Main, picture, setup, detection, hands, probe);
         detection.detectors = self.detectors;
         if cross_check.is_some() {
             self.other.check(&mut detection.map, &self.confidence);
@@ -150,6 +204,7 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
     }
 
     /// Runs one detector.
+    #[expect(clippy::too_many_arguments, reason = "what a frame has, input and output")]
     fn find<const OBSTACLES: usize>(
         &mut self,
         kind: DetectorKind,
@@ -157,12 +212,13 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
         picture: DisparityPicture<'_>,
         setup: &Setup,
         detection: &mut Detection<OBSTACLES, CELLS>,
+        hands: &mut impl Hands<CELLS>,
         probe: &mut impl Probe,
     ) -> SurfaceReport {
         let (report, ground) = match kind {
             DetectorKind::SurfaceNormals => {
                 probe.enter(Stage::Surfaces);
-                let report = self.surfaces.run(picture, &self.depth, &setup.rays);
+                let report = hands.find_surfaces(&mut self.surfaces, picture, &self.depth, &setup.rays);
                 (report, self.level_surfaces(turn, picture, setup, probe))
             }
             DetectorKind::PixelNormals => {
@@ -176,7 +232,7 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
             DetectorKind::GroundDeviation => self.deviations(picture, setup, probe),
             DetectorKind::DisparitySegments => {
                 probe.enter(Stage::Surfaces);
-                let report = self.surfaces.run(picture, &self.depth, &setup.rays);
+                let report = hands.find_surfaces(&mut self.surfaces, picture, &self.depth, &setup.rays);
                 probe.enter(Stage::Ground);
                 (report, self.segments.run(&mut self.surfaces, &mut self.regions, picture, &setup.frame))
             }
@@ -206,7 +262,7 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
                 self.map.finish(picture, &view, terrain, ground_seen, map, |_, cell| cell);
             }
             DetectorKind::SurfaceNormals | DetectorKind::PixelNormals | DetectorKind::GroundDeviation => {
-                self.map.run(&self.surfaces, picture, &view, terrain, ground_seen, map);
+                hands.fill_map(&mut self.map, &self.surfaces, picture, &view, terrain, ground_seen, map);
             }
         }
         detection.ground = ground.map(|plane| plane.moved(&setup.place));

@@ -55,7 +55,7 @@ fn look_at(world: &World, pixels: &[DisparityPixel], settings: &Settings) -> Loo
     interpreter.configure(settings, &setup, true).unwrap();
     let mut found = Box::new(Found::new());
     found.clear();
-    interpreter.run(DisparityPicture::new(pixels, 320), &setup, &mut found, &mut ());
+    interpreter.run(DisparityPicture::new(pixels, 320), &setup, &mut found, &mut Alone, &mut ());
     let class = |i: usize| interpreter.surfaces.surface_at(i % 320, i / 320).map(|surface| surface.class);
     Look { classes: (0..pixels.len()).map(class).collect(), found }
 }
@@ -310,7 +310,7 @@ fn any_disparities_are_survived_and_leave_nothing_behind() {
         let [found, expected] = &mut found;
         let see = |interpreter: &mut Small, pixels: &[DisparityPixel], found: &mut Found| {
             found.clear();
-            interpreter.run(DisparityPicture::new(pixels, 320), &setup, found, &mut ());
+            interpreter.run(DisparityPicture::new(pixels, 320), &setup, found, &mut Alone, &mut ());
             assert!(found.ground.is_some() || found.statistics.cells_free == 0, "round {round}: free without ground");
             std::format!("{found:?} {:?}", interpreter.surfaces.table())
         };

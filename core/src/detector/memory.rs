@@ -1,6 +1,6 @@
 //! How much memory a detector takes.
 
-use super::{Detection, Detector, Setup, interpreter::Interpreter};
+use super::{Band, Detection, Detector, Setup, interpreter::Interpreter};
 use crate::{
     disparity::DisparityPixel,
     health::{Content, ContentSigns, Debounce, HealthSettings, RecentPictures},
@@ -72,6 +72,22 @@ pub const fn memory_bytes(capacities: &Capacities) -> usize {
         + SURFACES * capacities.surfaces
         + OBSTACLES * capacities.obstacles
         + CELLS * capacities.cells
+}
+
+/// Bytes that a [`Band`] for a detector of these capacities takes, beside the detector itself; at most 128 bytes of padding more or
+/// less.
+pub const fn band_bytes(capacities: &Capacities) -> usize {
+    const BASE: usize = size_of::<Band<64, 16, 64>>();
+    const CELLS: usize = (size_of::<Band<64, 16, 128>>() - BASE) / 64;
+    const BY_WIDTH: usize = size_of::<Band<128, 16, 64>>() - BASE;
+    const BY_DISPARITIES: usize = size_of::<Band<64, 80, 64>>() - BASE;
+    const BOTH: usize = size_of::<Band<128, 80, 64>>() - BASE;
+    const PRODUCT: usize = (BOTH - BY_WIDTH - BY_DISPARITIES) / (64 * 64);
+    const WIDTH: usize = BY_WIDTH / 64 - 16 * PRODUCT;
+    const DISPARITIES: usize = BY_DISPARITIES / 64 - 64 * PRODUCT;
+    const CONSTANT: usize = BASE - (64 * CELLS + WIDTH * 64 + DISPARITIES * 16 + PRODUCT * 64 * 16);
+    let Capacities { width, disparities, cells, .. } = *capacities;
+    CONSTANT + WIDTH * width + DISPARITIES * disparities + PRODUCT * width * disparities + CELLS * cells
 }
 
 /// A part of a detector and the bytes that it takes.
@@ -158,6 +174,19 @@ mod tests {
         check(size_of::<Detector<{ 1242 * 375 }, 1242, 128, { LARGE.grid }, { LARGE.surfaces }, 64, 2500>>(), LARGE);
         for (name, capacities) in [("320 x 240 x 48", SMALL), ("512 x 384 x 64", LAGR), ("1242 x 375 x 128", LARGE)] {
             std::println!("{name}: {} bytes", memory_bytes(&capacities));
+        }
+    }
+
+    #[test]
+    fn tells_the_size_of_a_band() {
+        for (found, (width, height, disparities)) in [
+            (size_of::<Band<320, 48, 2500>>(), (320, 240, 48)),
+            (size_of::<Band<512, 64, 2500>>(), (512, 384, 64)),
+            (size_of::<Band<1242, 128, 2500>>(), (1242, 375, 128)),
+        ] {
+            let told = band_bytes(&Capacities::for_pictures(width, height, disparities));
+            std::println!("{width} x {height} x {disparities}: {told} bytes for a band");
+            assert!(found.abs_diff(told) <= 128, "{width} x {disparities}: {found} bytes, not {told}");
         }
     }
 

@@ -1,12 +1,14 @@
 //! The whole detector: one call from a pair of pictures to obstacle cells.
 
+mod bands;
 mod detection;
 mod interpreter;
 mod memory;
 mod stage;
 
+pub use bands::Band;
 pub use detection::{DetectError, Detection, Statistics};
-pub use memory::{Capacities, MemoryPart, memory_bytes};
+pub use memory::{Capacities, MemoryPart, band_bytes, memory_bytes};
 pub use stage::{Probe, Stage};
 
 use crate::{
@@ -26,7 +28,7 @@ use crate::{
     surfaces::{Surface, Surfaces},
     validate::SurfaceSize,
 };
-use interpreter::Interpreter;
+use interpreter::{Alone, Interpreter};
 
 /// Rows that are matched the other way round when left and right may be exchanged.
 const EXCHANGE_ROWS: usize = 8;
@@ -205,14 +207,7 @@ impl<
         right: &Picture<'_>,
         probe: &mut impl Probe,
     ) -> Result<&Detection<OBSTACLES, CELLS>, DetectError> {
-        self.detection.clear();
-        let Some(setup) = self.setup else { return Err(DetectError::NotConfigured) };
-        for (picture, expected) in [left, right].into_iter().zip(setup.picture_sizes) {
-            let found = (picture.width(), picture.height());
-            if found != expected {
-                return Err(DetectError::WrongSize { found, expected });
-            }
-        }
+        let setup = self.begin(left, right)?;
         let (width, height) = (setup.pair.width as usize, setup.pair.height as usize);
         self.match_rows(left, right, width, height, probe);
 
@@ -221,13 +216,38 @@ impl<
         self.surface_size.run(disparity);
 
         let picture = DisparityPicture::new(disparity, width);
-        self.interpreter.run(picture, &setup, &mut self.detection, probe);
+        self.interpreter.run(picture, &setup, &mut self.detection, &mut Alone, probe);
 
         probe.enter(Stage::Health);
+        let exposures = [Exposure::of(left), Exposure::of(right)];
+        Ok(self.judge(left, right, &setup, exposures))
+    }
+
+    /// Forgets the last pair and looks whether the pictures have the size that was configured.
+    fn begin(&mut self, left: &Picture<'_>, right: &Picture<'_>) -> Result<Setup, DetectError> {
+        self.detection.clear();
+        let Some(setup) = self.setup else { return Err(DetectError::NotConfigured) };
+        for (picture, expected) in [left, right].into_iter().zip(setup.picture_sizes) {
+            let found = (picture.width(), picture.height());
+            if found != expected {
+                return Err(DetectError::WrongSize { found, expected });
+            }
+        }
+        Ok(setup)
+    }
+
+    /// Says how far what was found can be trusted.
+    fn judge(
+        &mut self,
+        left: &Picture<'_>,
+        right: &Picture<'_>,
+        setup: &Setup,
+        exposures: [Exposure; 2],
+    ) -> &Detection<OBSTACLES, CELLS> {
+        let (width, height) = (setup.pair.width as usize, setup.pair.height as usize);
         let suspect = 100.0 * self.detection.statistics.coverage() < self.health.exchange_test_percent;
         let exchanged = suspect && self.matches_exchanged(left, right, width, height);
         self.content_signs = self.content.signs(self.health.structure_grey);
-        let exposures = [Exposure::of(left), Exposure::of(right)];
         let signs = Signs {
             exposures,
             came_again: self.recent_pictures.came_again(&exposures),
@@ -246,7 +266,7 @@ impl<
         }
         self.detection.health = told;
         self.detection.sectors = SectorDistances::of(&self.detection.map, setup.sector_width_deg);
-        Ok(&self.detection)
+        &self.detection
     }
 
     /// Rectifies and matches, row by row.
@@ -259,10 +279,7 @@ impl<
         probe: &mut impl Probe,
     ) {
         self.matcher.begin();
-        let MatchSettings { min_disparity, disparities, .. } = *self.matcher.settings();
-        let first = usize::from(min_disparity);
-        let range = SearchRange { first, last: first.saturating_add(usize::from(disparities).saturating_sub(1)) };
-        self.content.begin(width, height, range);
+        self.content.begin(width, height, self.search_range());
         let [left_row, right_row] = &mut self.rows;
         let left_row = left_row.get_mut(..width).unwrap_or_default();
         let right_row = right_row.get_mut(..width).unwrap_or_default();
@@ -287,6 +304,13 @@ impl<
             self.content.push(y, [left_row, right_row], spans);
             self.content.look(&self.matcher, &self.disparity, width, next);
         }
+    }
+
+    /// The disparities that are searched.
+    fn search_range(&self) -> SearchRange {
+        let MatchSettings { min_disparity, disparities, .. } = *self.matcher.settings();
+        let first = usize::from(min_disparity);
+        SearchRange { first, last: first + usize::from(disparities).saturating_sub(1) }
     }
 
     /// Whether the pictures match far better when left and right are exchanged, seen on a few rows.

@@ -1,10 +1,12 @@
 //! Everything that is learnt of the pictures while their rectified rows go by.
 
+use core::ops::Range;
+
 use super::{
     pairing::{Pairing, PairingSign},
     profile::Profile,
-    row_error::{MARGIN, RowSign, STRIPS, SearchRange, SparseMatches},
-    tiles::{Covering, Tiles},
+    row_error::{MARGIN, Ordinals, RowSign, STRIPS, SearchRange, SparseMatches},
+    tiles::{BLOCK, Covering, Tiles},
 };
 use crate::{
     arch::{self, Chosen, Steps},
@@ -17,9 +19,15 @@ use crate::{
 /// Takes 15 KiB and 4 bytes for each pixel of a row.
 #[derive(Clone, Debug)]
 pub(crate) struct Content<const WIDTH: usize> {
+    pub(crate) looks: RowLooks<WIDTH>,
+    pairing: Pairing,
+}
+
+/// What the rows of a pair of pictures say as they go by: all of them, or those of a band.
+#[derive(Clone, Debug)]
+pub(crate) struct RowLooks<const WIDTH: usize> {
     tiles: [Tiles<WIDTH>; 2],
     profiles: [Profile; 2],
-    pairing: Pairing,
     sparse: SparseMatches,
     height: usize,
     range: SearchRange,
@@ -49,22 +57,12 @@ impl ContentSigns {
 
 impl<const WIDTH: usize> Content<WIDTH> {
     pub(crate) const fn new() -> Self {
-        Self {
-            tiles: [const { Tiles::new() }; 2],
-            profiles: [const { Profile::new() }; 2],
-            pairing: Pairing::new(),
-            sparse: SparseMatches::new(),
-            height: 0,
-            range: SearchRange { first: 0, last: 0 },
-            next_strip: 0,
-            chosen: Chosen::PLAIN,
-        }
+        Self { looks: RowLooks::new(), pairing: Pairing::new() }
     }
 
     /// Has rows looked at with the instructions of a backend.
     pub(crate) const fn choose(&mut self, chosen: Chosen) {
-        self.chosen = chosen;
-        self.sparse.choose(chosen);
+        self.looks.choose(chosen);
     }
 
     /// Forgets the pictures of before.
@@ -74,6 +72,62 @@ impl<const WIDTH: usize> Content<WIDTH> {
 
     /// Starts a pair of pictures.
     pub(crate) fn begin(&mut self, width: usize, height: usize, range: SearchRange) {
+        self.looks.begin(width, height, range);
+    }
+
+    /// Takes row `y` of both rectified pictures.
+    ///
+    /// # Bound
+    /// Three passes over each of the rows.
+    pub(crate) fn push(&mut self, y: usize, rows: [&[u8]; 2], spans: [ValidSpan; 2]) {
+        self.looks.push(y, rows, spans);
+    }
+
+    /// [`RowLooks::look`] for all rows: `disparity` is the picture so far, rows of `width`, `done` of them.
+    pub(crate) fn look<const DISPARITIES: usize>(
+        &mut self,
+        matcher: &Matcher<WIDTH, DISPARITIES>,
+        disparity: &[DisparityPixel],
+        width: usize,
+        done: usize,
+    ) {
+        self.looks.look((matcher, 0), (disparity, 0), width, done, None);
+    }
+
+    /// What the pair says, and what it says beside those of before.
+    ///
+    /// # Bound
+    /// That of [`Pairing::compare`], [`Tiles::lacks`] and [`SparseMatches::sign`].
+    pub(crate) fn signs(&mut self, structure_grey: f32) -> ContentSigns {
+        let RowLooks { tiles, profiles, sparse, range, .. } = &mut self.looks;
+        let ([left, right], last) = (&*tiles, range.last);
+        ContentSigns {
+            coverings: [left.lacks(right, (last, 0), structure_grey), right.lacks(left, (0, last), structure_grey)],
+            pairing: self.pairing.compare(profiles),
+            rows: sparse.sign(),
+        }
+    }
+}
+
+impl<const WIDTH: usize> RowLooks<WIDTH> {
+    pub(crate) const fn new() -> Self {
+        Self {
+            tiles: [const { Tiles::new() }; 2],
+            profiles: [const { Profile::new() }; 2],
+            sparse: SparseMatches::new(),
+            height: 0,
+            range: SearchRange { first: 0, last: 0 },
+            next_strip: 0,
+            chosen: Chosen::PLAIN,
+        }
+    }
+
+    const fn choose(&mut self, chosen: Chosen) {
+        self.chosen = chosen;
+        self.sparse.choose(chosen);
+    }
+
+    fn begin(&mut self, width: usize, height: usize, range: SearchRange) {
         self.tiles.iter_mut().for_each(|tiles| tiles.begin(width, height));
         self.profiles.iter_mut().for_each(|profile| profile.begin(height));
         self.sparse.begin();
@@ -83,11 +137,8 @@ impl<const WIDTH: usize> Content<WIDTH> {
     }
 
     /// Takes row `y` of both rectified pictures.
-    ///
-    /// # Bound
-    /// Three passes over each of the rows.
     pub(crate) fn push(&mut self, y: usize, rows: [&[u8]; 2], spans: [ValidSpan; 2]) {
-        arch::compiled(self.chosen, PushRow { content: self, y, rows, spans });
+        arch::compiled(self.chosen, PushRow { looks: self, y, rows, spans });
     }
 
     #[inline(always)]
@@ -100,57 +151,89 @@ impl<const WIDTH: usize> Content<WIDTH> {
         }
     }
 
-    /// Looks for sparse matches in the strips for which `matcher` has all rows now; `disparity` is the picture so far, rows of
-    /// `width`, `done` of them.
+    /// Looks for sparse matches in the strips for which the matcher has all rows now. The matcher's first row and that of `disparity`,
+    /// rows of `width`, lie in the rows of the picture that are given with them; down to row `done` there are disparities.
     ///
     /// # Bound
     /// [`SparseMatches::look`], [`STRIPS`] times for each picture.
     pub(crate) fn look<const DISPARITIES: usize>(
         &mut self,
-        matcher: &Matcher<WIDTH, DISPARITIES>,
-        disparity: &[DisparityPixel],
+        (matcher, top): (&Matcher<WIDTH, DISPARITIES>, usize),
+        (disparity, first): (&[DisparityPixel], usize),
         width: usize,
         done: usize,
+        mut ordinals: Option<&mut Ordinals>,
     ) {
         while self.next_strip < STRIPS {
-            let y = self.height.saturating_mul(self.next_strip + 1) / (STRIPS + 1);
+            let y = strip_row(self.height, self.next_strip);
             if done <= y {
                 return;
             }
             // Near the upper and lower edge there are not enough rows, and there never will be.
             if y > MARGIN && y.saturating_add(MARGIN + 1) < self.height {
-                if !matcher.has_filtered(y.saturating_add(MARGIN)) {
+                let (in_matcher, in_disparity) = (y.saturating_sub(top), y.saturating_sub(first));
+                if !matcher.has_filtered(in_matcher.saturating_add(MARGIN)) {
                     return;
                 }
                 // Within the picture.
-                let start = y.wrapping_mul(width);
+                let start = in_disparity.wrapping_mul(width);
                 let row = disparity.get(start..start.wrapping_add(width)).unwrap_or_default();
-                if let Some(strip) = matcher.strip(y) {
-                    self.sparse.look(&strip, row, self.range, y >= self.height.saturating_sub(y));
+                if let Some(strip) = matcher.strip(in_matcher) {
+                    let lower = y >= self.height.saturating_sub(y);
+                    self.sparse.look(&strip, row, self.range, lower, ordinals.as_deref_mut());
                 }
             }
             self.next_strip = self.next_strip.wrapping_add(1);
         }
     }
 
-    /// What the pair says, and what it says beside those of before.
+    /// Starts a band of the pair of pictures that `whole` was started for, at row `first`.
+    pub(crate) fn begin_band(&mut self, whole: &Self, width: usize, first: usize) {
+        self.choose(whole.chosen);
+        self.begin(width, whole.height, whole.range);
+        self.next_strip = (0..STRIPS).filter(|&strip| strip_row(whole.height, strip) < first).count();
+    }
+
+    /// Adds what the rows of a band below said.
     ///
     /// # Bound
-    /// That of [`Pairing::compare`], [`Tiles::lacks`] and [`SparseMatches::sign`].
-    pub(crate) fn signs(&mut self, structure_grey: f32) -> ContentSigns {
-        let [left, right] = &self.tiles;
-        let last = self.range.last;
-        ContentSigns {
-            coverings: [left.lacks(right, (last, 0), structure_grey), right.lacks(left, (0, last), structure_grey)],
-            pairing: self.pairing.compare(&self.profiles),
-            rows: self.sparse.sign(),
-        }
+    /// One pass over the tables.
+    pub(crate) fn append(&mut self, band: &Self, ordinals: &Ordinals) {
+        self.tiles.iter_mut().zip(&band.tiles).for_each(|(all, band)| all.append(band));
+        self.profiles.iter_mut().zip(&band.profiles).for_each(|(all, band)| all.append(band));
+        self.sparse.append(&band.sparse, ordinals);
     }
+}
+
+/// Row of the picture in the middle of a strip.
+const fn strip_row(height: usize, strip: usize) -> usize {
+    height * (strip + 1) / (STRIPS + 1)
+}
+
+/// Bands of the pictures must be cut between multiples of so many rows: blocks and the rows of a profile are seen as a whole.
+pub(crate) fn unit_of_bands(height: usize) -> usize {
+    let rows = Profile::rows_of_band(height);
+    match rows % BLOCK {
+        0 => rows,
+        2 => 2 * rows,
+        _ => BLOCK * rows,
+    }
+}
+
+/// Rows that a matcher which begins with a band needs above and below the rows `band`, so that the strips among them can be looked
+/// at; `reach` rows around a filtered one are needed for that.
+pub(crate) fn rows_around(height: usize, band: &Range<usize>, reach: usize) -> [usize; 2] {
+    let around = MARGIN + reach;
+    let strips = (0..STRIPS).map(|strip| strip_row(height, strip)).filter(|y| band.contains(y));
+    strips.fold([0, 0], |[above, below], y| {
+        let lacking = [y - band.start, band.end - 1 - y].map(|there| around.saturating_sub(there));
+        [above.max(lacking[0]), below.max(lacking[1])]
+    })
 }
 
 /// A row of both pictures.
 struct PushRow<'a, const WIDTH: usize> {
-    content: &'a mut Content<WIDTH>,
+    looks: &'a mut RowLooks<WIDTH>,
     y: usize,
     rows: [&'a [u8]; 2],
     spans: [ValidSpan; 2],
@@ -159,7 +242,7 @@ struct PushRow<'a, const WIDTH: usize> {
 impl<const WIDTH: usize> Steps for PushRow<'_, WIDTH> {
     #[inline(always)]
     fn run(self) {
-        self.content.take(self.y, self.rows, self.spans);
+        self.looks.take(self.y, self.rows, self.spans);
     }
 }
 

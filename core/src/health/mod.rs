@@ -10,15 +10,15 @@ mod row_error;
 mod settings;
 mod tiles;
 
-pub(crate) use content::Content;
 pub use content::ContentSigns;
+pub(crate) use content::{Content, RowLooks, rows_around, unit_of_bands};
 pub use debounce::{Debounce, Findings};
 pub use exposure::Exposure;
 pub(crate) use exposure::RecentPictures;
 pub use pairing::PairingSign;
 pub use reasons::{Health, HealthLevel, HealthReason};
 pub use row_error::RowSign;
-pub(crate) use row_error::SearchRange;
+pub(crate) use row_error::{Ordinals, SearchRange};
 pub use settings::HealthSettings;
 pub use tiles::Covering;
 

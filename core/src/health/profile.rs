@@ -40,7 +40,7 @@ impl Profile {
 
     /// Starts a picture of `height` rows.
     pub(super) fn begin(&mut self, height: usize) {
-        self.rows_per_band = height.div_ceil(BANDS).max(1);
+        self.rows_per_band = Self::rows_of_band(height);
         self.bands = (height / self.rows_per_band).min(BANDS);
         self.grey.fill(0.0);
         self.contrast.fill(0.0);
@@ -74,6 +74,20 @@ impl Profile {
             .fold(0u32, |sum, (&after, &before)| sum.wrapping_add(u32::from(after.abs_diff(before).min(STRONGEST))));
         *grey += sum as f32 / valid.len() as f32;
         *contrast += steps as f32 / after.len() as f32;
+    }
+
+    /// Rows of a band, before and after the first picture of a size.
+    pub(super) fn rows_of_band(height: usize) -> usize {
+        height.div_ceil(BANDS).max(1)
+    }
+
+    /// Adds what was seen of other bands of the same picture: of each band one of the two knows nothing.
+    pub(super) fn append(&mut self, other: &Self) {
+        for (mine, other) in [(&mut self.grey, &other.grey), (&mut self.contrast, &other.contrast)] {
+            for (mine, other) in mine.iter_mut().zip(other) {
+                *mine += other;
+            }
+        }
     }
 
     /// Writes the signature of the picture.

@@ -64,6 +64,9 @@ pub(crate) struct SparseMatches {
     chosen: Chosen,
 }
 
+/// For each match by the how manieth search of a band it was found, from 1; 0 for none.
+pub(crate) type Ordinals = Vec<u8, { STRIPS * PLACES }, u16>;
+
 /// What the sparse matches say of the rows and of the near zone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RowSign {
@@ -99,7 +102,24 @@ impl SparseMatches {
         (self.lower, self.near) = (0, 0);
     }
 
-    /// Looks along the middle row of `strip`, whose disparities are `row`; `lower` if it lies in the lower half.
+    /// Adds the matches of rows below, whose searches are numbered: only as many searches of the whole picture count as there are.
+    ///
+    /// # Bound
+    /// One step for each match.
+    pub(crate) fn append(&mut self, other: &Self, ordinals: &Ordinals) {
+        for (&error, &ordinal) in other.errors.iter().zip(ordinals) {
+            if usize::from(ordinal) <= self.searches_left {
+                // Cannot fail: there is room for every place.
+                let _ = self.errors.push(error);
+            }
+        }
+        self.searches_left = self.searches_left.saturating_sub(SEARCHES - other.searches_left);
+        self.lower += other.lower;
+        self.near += other.near;
+    }
+
+    /// Looks along the middle row of `strip`, whose disparities are `row`; `lower` if it lies in the lower half. `ordinals` are told
+    /// for each match by the how manieth search it was found, 0 for none.
     ///
     /// # Bound
     /// Nine steps for every second pixel of the row; for each of [`PLACES`] places `7 x 9` patches of 49 pixels, `3 x` the
@@ -110,6 +130,7 @@ impl SparseMatches {
         row: &[DisparityPixel],
         range: SearchRange,
         lower: bool,
+        mut ordinals: Option<&mut Ordinals>,
     ) {
         let span = strip.left_span;
         let (start, end) = (usize::from(span.start) + RADIUS + 1, usize::from(span.end).min(row.len()));
@@ -120,7 +141,13 @@ impl SparseMatches {
             let at = |place: usize| start.wrapping_add(width.wrapping_mul(place) / PLACES);
             let part = at(place)..at(place + 1);
             if let Some(x) = most_contrast(self.chosen, strip, row, part) {
+                let (errors, searches_left) = (self.errors.len(), self.searches_left);
                 self.look_at(strip, x, row.get(x).copied().unwrap_or_default(), range, lower);
+                if let Some(ordinals) = ordinals.as_deref_mut().filter(|_| self.errors.len() > errors) {
+                    let searched = searches_left > self.searches_left;
+                    // Cannot fail: there is room for as many as for errors.
+                    let _ = ordinals.push(if searched { (SEARCHES - self.searches_left) as u8 } else { 0 });
+                }
             }
         }
     }

@@ -3,7 +3,7 @@
 use crate::matching::ValidSpan;
 
 /// Edge of the blocks whose means are compared, px: large enough for the noise of a sensor to drop out.
-const BLOCK: usize = 4;
+pub(super) const BLOCK: usize = 4;
 
 /// Most tiles across and down.
 const COLUMNS: usize = 16;
@@ -116,6 +116,16 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
             }
         }
         blocks.fill(0);
+    }
+
+    /// Adds what was seen of other rows of the same picture, from the first of a block on.
+    pub(super) fn append(&mut self, other: &Self) {
+        for (steps, other) in self.steps.as_flattened_mut().iter_mut().zip(other.steps.as_flattened()) {
+            *steps += other;
+        }
+        for (count, other) in self.counts.as_flattened_mut().iter_mut().zip(other.counts.as_flattened()) {
+            *count = count.saturating_add(*other);
+        }
     }
 
     /// Structure of a tile, grey values; `None` where too little of it is valid.

@@ -63,12 +63,12 @@ pub(crate) enum Vote {
 /// # Bound
 /// One pass of `width x height` steps, one of `CELLS`.
 pub struct MapBuilder<const CELLS: usize> {
-    settings: MapSettings,
-    obstacle_heights_m: (f32, f32),
-    evidence: [Evidence; CELLS],
+    pub(super) settings: MapSettings,
+    pub(super) obstacle_heights_m: (f32, f32),
+    pub(super) evidence: [Evidence; CELLS],
     /// Of the surfaces of one tile.
-    common: [Common; MAX_TILE_SURFACES],
-    chosen: Chosen,
+    pub(super) common: [Common; MAX_TILE_SURFACES],
+    pub(super) chosen: Chosen,
 }
 
 impl<const CELLS: usize> MapBuilder<CELLS> {
@@ -115,15 +115,14 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         if (picture.width(), picture.height()) == surfaces.size() {
             let Self { settings, obstacle_heights_m, evidence, common, chosen } = self;
             let evidence = evidence.get_mut(..settings.geometry.len()).unwrap_or_default();
-            let obstacle_heights_m = *obstacle_heights_m;
+            let (obstacle_heights_m, rows) = (*obstacle_heights_m, 0..picture.height());
             arch::compiled(
                 *chosen,
-                Collect { settings, obstacle_heights_m, evidence, common, surfaces, picture, view, ground },
+                Collect { settings, obstacle_heights_m, evidence, common, surfaces, picture, view, ground, rows },
             );
         }
         self.fill(picture, view, ground, ground_seen, map, |_, cell| cell);
-        smear::take_out(map, view.place, &self.settings);
-        shadow::mark(map, view.place);
+        self.compare_cells(view.place, map);
     }
 
     /// Begins a map for which nothing was seen.
@@ -189,8 +188,14 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         }
     }
 
+    /// Looks at the cells of a map beside each other, when each has been decided on.
+    pub(super) fn compare_cells(&self, place: &Place, map: &mut ObstacleMap<CELLS>) {
+        smear::take_out(map, place, &self.settings);
+        shadow::mark(map, place);
+    }
+
     /// What the votes make of a cell.
-    fn decide<const DISPARITIES: usize>(
+    pub(super) fn decide<const DISPARITIES: usize>(
         &self,
         index: usize,
         evidence: &Evidence,

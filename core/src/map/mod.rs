@@ -1,5 +1,6 @@
 //! The map: square cells on the ground around the robot, and distances by sector.
 
+mod bands;
 mod builder;
 mod cells;
 mod merge;
@@ -9,6 +10,7 @@ mod shadow;
 mod smear;
 mod votes;
 
+pub(crate) use bands::Votes;
 pub(crate) use builder::{Evidence, Vote};
 pub use builder::{MapBuilder, View};
 pub use cells::{Cell, CellState, Doubt, MapGeometry, ObstacleMap, UnknownReason};

@@ -1,5 +1,7 @@
 //! The votes of the pixels, tile by tile, eight pixels side by side.
 
+use core::ops::Range;
+
 use super::{MapGeometry, MapSettings, View, builder::Evidence};
 use crate::{
     arch::Steps,
@@ -83,6 +85,8 @@ pub(super) struct Collect<'a, const PIXELS: usize, const SURFACES: usize, const 
     pub(super) picture: DisparityPicture<'a>,
     pub(super) view: &'a View<'a, DISPARITIES>,
     pub(super) ground: &'a Terrain,
+    /// Rows that are looked at: whole tiles.
+    pub(super) rows: Range<usize>,
 }
 
 impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
@@ -90,7 +94,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
 {
     #[inline(always)]
     fn run(mut self) {
-        for y0 in (0..self.picture.height()).step_by(TILE) {
+        for y0 in self.rows.clone().step_by(TILE) {
             for x0 in (0..self.picture.width()).step_by(TILE) {
                 let found = self.surfaces.of_tile(x0, y0);
                 if found.is_empty() {
@@ -99,7 +103,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
                 for (common, surface) in self.common.iter_mut().zip(found) {
                     *common = Common::of(surface, self.ground);
                 }
-                for y in y0..y0.saturating_add(TILE).min(self.picture.height()) {
+                for y in y0..y0.saturating_add(TILE).min(self.rows.end) {
                     self.row(x0, y);
                 }
             }

@@ -3,6 +3,7 @@
 //! Rows of the rectified pair go in from the top, rows of the disparity picture come out, half a window later. Nothing of
 //! the pictures is kept but the rows under the window.
 
+mod bands;
 mod best;
 mod census;
 mod columns;

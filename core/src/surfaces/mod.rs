@@ -1,7 +1,9 @@
 //! Surfaces: contiguous pieces of the disparity picture inside 32 x 32 tiles, and the plane through each.
 
+mod bands;
 mod join;
 mod moments;
+mod part;
 mod settings;
 mod tile;
 
@@ -21,7 +23,9 @@ use crate::{
     planes::Scatter,
 };
 use moments::{Moments, RowMoments};
-use tile::{CODE_SHIFT, MAX_SURFACES, NUMBER_MASK, Tile, TileUnion};
+pub(crate) use part::TileWork;
+use part::{Growing, Limits, Part, Table};
+use tile::{CODE_SHIFT, MAX_SURFACES, NUMBER_MASK, Tile};
 pub(crate) use tile::{CODES, MAX_SURFACES as MAX_TILE_SURFACES};
 
 /// Edge of a tile, px. The paper, section 4.4.
@@ -94,16 +98,12 @@ pub struct SurfaceReport {
 /// Five passes of `width x height` steps, and an eigen-solution for each surface.
 pub struct Surfaces<const PIXELS: usize, const SURFACES: usize> {
     settings: SurfaceSettings,
-    /// Cosines of the limits of the classes.
-    least_dot_of_horizontal: f32,
-    most_dot_of_vertical: f32,
+    limits: Limits,
     width: usize,
     height: usize,
     /// Number of the surface of each pixel within its tile, from 1; 0 where there is none.
     labels: [u8; PIXELS],
-    union: TileUnion,
-    moments: [Moments; MAX_SURFACES],
-    shifts: [u8; MAX_SURFACES],
+    work: TileWork,
     /// Place of each tile's first surface in the table.
     tiles: Vec<u16, SURFACES, u16>,
     table: Vec<Surface, SURFACES, u16>,
@@ -116,14 +116,11 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         const { assert!(SURFACES < u16::MAX as usize, "places in the table must fit 16 bits") };
         Self {
             settings: SurfaceSettings::UNSET,
-            least_dot_of_horizontal: 0.0,
-            most_dot_of_vertical: 0.0,
+            limits: Limits::UNSET,
             width: 0,
             height: 0,
             labels: [0; PIXELS],
-            union: TileUnion::new(),
-            moments: [Moments::ZERO; MAX_SURFACES],
-            shifts: [0; MAX_SURFACES],
+            work: TileWork::new(),
             tiles: Vec::new(),
             table: Vec::new(),
             chosen: Chosen::PLAIN,
@@ -143,8 +140,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         capacity("calibration.width x calibration.height", width.saturating_mul(height), PIXELS)?;
         capacity("tiles of the picture", width.div_ceil(TILE).saturating_mul(height.div_ceil(TILE)), SURFACES)?;
         self.settings = *settings;
-        self.least_dot_of_horizontal = libm::cosf(settings.horizontal_deg.to_radians());
-        self.most_dot_of_vertical = libm::cosf(settings.vertical_deg.to_radians());
+        self.limits = Limits::new(settings);
         self.width = width;
         self.height = height;
         self.tiles.clear();
@@ -217,24 +213,25 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         classes: &[SurfaceClass; CODES],
     ) -> u32 {
         let pixels = picture.pixels();
-        let (covered, mut found) = (depth.covered(), 0u32);
-        for tile in Tile::all(self.width, self.height) {
-            let Self { union, settings, labels, width, .. } = self;
-            found =
-                found.saturating_add(u32::from(union.label::<CODED>(pixels, *width, tile, settings, &covered, labels)));
-        }
+        let (mut part, mut grown) = self.whole();
+        let found = part.label_tiles::<CODED>(pixels, &depth.covered());
         let mut keep = KeepRule::everything();
         if found as usize > SURFACES {
-            keep = self.keep_largest::<CODED>();
+            keep = part.keep_largest::<CODED>(SURFACES);
         }
-        for tile in Tile::all(self.width, self.height) {
-            let first = self.table.len() as u16;
-            // Cannot fail: `configure` made sure that there is room for every tile.
-            let _ = self.tiles.push(first);
-            let given = if CODED { Some(self.take_classes(tile, classes)) } else { None };
-            self.measure(pixels, tile, depth, rays, &mut keep, given.as_ref());
-        }
+        part.measure_tiles::<DISPARITIES, CODED>(pixels, depth, rays, &mut keep, classes, &mut grown);
         found
+    }
+
+    /// All rows of the picture, and the tables that grow with them.
+    #[inline(always)]
+    fn whole(&mut self) -> (Part<'_>, Growing<'_, SURFACES>) {
+        let Self { settings, limits, width, height, labels, work, tiles, table, .. } = self;
+        let (settings, limits) = (&*settings, &*limits);
+        let labels = labels.get_mut(..*width * *height).unwrap_or_default();
+        let TileWork { union, moments, shifts } = work;
+        let part = Part { settings, limits, width: *width, height: *height, top: 0, labels, union, moments, shifts };
+        (part, Growing { tiles, table })
     }
 
     /// The surfaces, tile by tile.
@@ -300,9 +297,11 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
     pub(crate) const fn settings(&self) -> &SurfaceSettings {
         &self.settings
     }
+}
 
-    /// The size from which on the table has room for all surfaces.
-    fn keep_largest<const CODED: bool>(&mut self) -> KeepRule {
+impl Part<'_> {
+    /// The size from which on a table of `capacity` has room for all surfaces.
+    fn keep_largest<const CODED: bool>(&mut self, capacity: usize) -> KeepRule {
         // Sizes are counted from the largest down; the union's counters are free now.
         let by_size = self.union.scratch();
         by_size.fill(0);
@@ -322,7 +321,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
                 }
             }
         }
-        let mut room = SURFACES;
+        let mut room = capacity;
         for (i, &count) in by_size.iter().enumerate().rev() {
             let Some(left) = room.checked_sub(usize::from(count)) else {
                 return KeepRule { at_least: (i as u16).wrapping_add(1), of_smallest: room as u16 };
@@ -357,6 +356,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         rays: &Rays,
         keep: &mut KeepRule,
         given: Option<&[SurfaceClass; MAX_SURFACES]>,
+        table: &mut impl Table,
     ) {
         let stride = self.width;
         let row = |y: usize| tile.row(y, stride);
@@ -373,7 +373,9 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
                 }
             }
         }
-        for ((farthest, shift), moments) in farthest.iter().zip(&mut self.shifts).zip(&mut self.moments).take(count) {
+        for ((farthest, shift), moments) in
+            farthest.iter().zip(self.shifts.iter_mut()).zip(self.moments.iter_mut()).take(count)
+        {
             // The bits beyond the lowest 16 that are used.
             *shift = 16u32.saturating_sub(depth.inverse(*farthest).leading_zeros()) as u8;
             *moments = Moments::ZERO;
@@ -395,15 +397,15 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         }
         let mut renumbered = [0u8; MAX_SURFACES];
         let (mut kept, mut left_out) = (0u8, false);
-        let [u, v] = [tile.x, tile.y].map(|first| first.wrapping_add(TILE / 2) as f32);
+        let [u, v] = [tile.x, self.top.wrapping_add(tile.y)].map(|first| first.wrapping_add(TILE / 2) as f32);
         for (i, number) in renumbered.iter_mut().enumerate().take(count) {
             let (moments, shift) = (&self.moments[i], u32::from(self.shifts[i]));
             let unit_m = depth.scale_m() * (1u32 << (shift & 31)) as f32;
-            let mut surface = self.classify(moments.scatter(rays, u, v, unit_m));
+            let mut surface = self.limits.classify(moments.scatter(rays, u, v, unit_m));
             if let Some(&class) = given.and_then(|given| given.get(i)) {
                 surface.class = class;
             }
-            if keep.keeps(moments.pixels()) && self.table.push(surface).is_ok() {
+            if keep.keeps(moments.pixels()) && table.push(surface) {
                 kept = kept.wrapping_add(1);
                 *number = kept;
             } else {
@@ -418,7 +420,9 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             }
         }
     }
+}
 
+impl Limits {
     /// Fits the plane and tells horizontal from vertical.
     fn classify(&self, points: Scatter) -> Surface {
         let Some((normal, variance)) = points.plane() else {

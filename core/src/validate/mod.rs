@@ -1,5 +1,6 @@
 //! Validation of the disparity picture by the size of its surfaces.
 
+mod bands;
 mod settings;
 
 pub use settings::ValidateSettings;
@@ -110,17 +111,21 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         if self.settings.min_surface_px <= 1 || self.width == 0 {
             return;
         }
-        arch::compiled(self.chosen, Rows { stage: self, picture });
+        arch::compiled(self.chosen, Rows { stage: self, picture, seams: [false; 2] });
     }
 
     #[inline(always)]
-    fn go_through(&mut self, picture: &mut [DisparityPixel]) {
+    fn go_through(&mut self, picture: &mut [DisparityPixel], [above, below]: [bool; 2]) {
         let mut open = 0;
         for y in 0..picture.len().checked_div(self.width).unwrap_or(0) {
             let (runs, used) = self.join_row(picture, y, open);
+            if above && y == 0 {
+                let surfaces = self.table.as_flattened_mut().iter_mut().take(used);
+                surfaces.for_each(|surface| surface.pixels = self.settings.min_surface_px);
+            }
             open = self.end_row(picture, runs, used);
         }
-        for place in 0..open {
+        for place in 0..if below { 0 } else { open } {
             let Some(&surface) = self.next.get(place) else { break };
             self.take_out(picture, surface);
         }
@@ -270,12 +275,14 @@ impl<const WIDTH: usize> Default for SurfaceSize<WIDTH> {
 struct Rows<'a, const WIDTH: usize> {
     stage: &'a mut SurfaceSize<WIDTH>,
     picture: &'a mut [DisparityPixel],
+    /// Whether the picture goes on above and below: what touches those edges is large enough.
+    seams: [bool; 2],
 }
 
 impl<const WIDTH: usize> Steps for Rows<'_, WIDTH> {
     #[inline(always)]
     fn run(self) {
-        self.stage.go_through(self.picture);
+        self.stage.go_through(self.picture, self.seams);
     }
 }
 

@@ -12,6 +12,7 @@ use std::{
 
 use fencepost_core::{
     arch::Backend,
+    bands::MAX_BANDS,
     settings::Settings,
     wire::{Frame, Scan, ScanEncoder, WireConfig},
 };
@@ -20,6 +21,7 @@ use heapless::Vec as FixedVec;
 use super::{BenchPictures, Pair};
 use crate::{
     can_log::{FRAMES, RUNS},
+    crew::Crew,
     detector::{self, ProgramDetector},
     error::Failure,
     live::MAX_PAIRS,
@@ -35,6 +37,8 @@ const WARM_UP: usize = 5;
 pub struct Measurement {
     /// Threads, each with a detector of its own.
     pub threads: usize,
+    /// Bands that each picture was cut into, with a thread each.
+    pub bands: usize,
     /// The frames of all threads.
     pub frames: Vec<FrameTimes>,
 }
@@ -52,6 +56,8 @@ pub struct Job<'a> {
     pub file: Option<&'a Path>,
     /// Threads that work at the same time, at most [`MAX_PAIRS`]: so many detectors the program has.
     pub threads: usize,
+    /// Bands that each picture is cut into, at most [`MAX_BANDS`], with a thread for each; 1 for none.
+    pub bands: usize,
     /// Frames on each thread.
     pub frames: usize,
 }
@@ -68,7 +74,7 @@ pub fn measure(pictures: &BenchPictures, job: &Job<'_>) -> Result<Measurement, F
     let (start, busy) = (Barrier::new(threads), AtomicUsize::new(threads));
     let work = |index: usize| -> Result<Vec<FrameTimes>, Failure> {
         let mut detector = detector::lock_one(index);
-        let prepared = Worker::new(&mut detector, pictures, job);
+        let prepared = Worker::new(index, &mut detector, pictures, job);
         // Every thread comes here, also one that cannot go on: the others wait for it.
         start.wait();
         let measured = prepared.and_then(|mut worker| {
@@ -94,24 +100,31 @@ pub fn measure(pictures: &BenchPictures, job: &Job<'_>) -> Result<Measurement, F
     for result in results {
         all.extend(result.map_err(|_| Failure::work("a thread of the measurement broke off"))??);
     }
-    Ok(Measurement { threads, frames: all })
+    Ok(Measurement { threads, bands: job.bands.clamp(1, MAX_BANDS), frames: all })
 }
 
 /// One detector, and what makes CAN payloads of what it finds.
 struct Worker<'a> {
     detector: &'a mut ProgramDetector,
+    crew: Crew,
     encoder: Box<ScanEncoder<RUNS>>,
     payloads: Box<FixedVec<Frame, FRAMES>>,
     next: usize,
 }
 
 impl<'a> Worker<'a> {
-    fn new(detector: &'a mut ProgramDetector, pictures: &BenchPictures, job: &Job<'_>) -> Result<Self, Failure> {
+    fn new(
+        index: usize,
+        detector: &'a mut ProgramDetector,
+        pictures: &BenchPictures,
+        job: &Job<'_>,
+    ) -> Result<Self, Failure> {
         let failure = |error| Failure::config(error, job.file);
         detector.set_backend(job.backend.unwrap_or_else(Backend::fastest));
         detector.configure(job.settings, &pictures.calibration, &pictures.mount).map_err(failure)?;
         let encoder = ScanEncoder::new(job.wire).map_err(failure)?;
-        let mut worker = Self { detector, encoder: Box::new(encoder), payloads: Box::default(), next: 0 };
+        let crew = Crew::new(index, job.bands, || ())?;
+        let mut worker = Self { detector, crew, encoder: Box::new(encoder), payloads: Box::default(), next: 0 };
         worker.frames(pictures, WARM_UP)?;
         Ok(worker)
     }
@@ -130,11 +143,11 @@ impl<'a> Worker<'a> {
         let (left, right) = pair.views();
         let mut watch = Stopwatch::default();
         let start = Instant::now();
-        let detection = self
-            .detector
-            .detect(&left, &right, &mut watch)
+        self.crew
+            .detect(self.detector, &left, &right, &mut watch)
             .map_err(|error| Failure::work(format!("the pictures cannot be used: {error:?}")))?;
         let mut times = watch.finish(start.elapsed());
+        let detection = self.detector.detection();
         let scan = Scan {
             scan_index: self.next as u16,
             age_ns: 0,

@@ -10,7 +10,7 @@ pub use pictures::{BenchPictures, Pair};
 
 use fencepost_core::{
     arch::Backend,
-    detector::{Capacities, Stage, memory_bytes},
+    detector::{Capacities, Stage, band_bytes, memory_bytes},
 };
 use serde_json::{Map, Value, json};
 
@@ -32,10 +32,11 @@ pub struct Report {
 }
 
 impl Report {
-    /// Bytes of a detector that is just large enough.
+    /// Bytes of a detector that is just large enough, and of what it takes for more bands than one.
     pub fn memory_bytes(&self) -> usize {
         let (width, height) = self.size;
-        memory_bytes(&Capacities::for_pictures(width as usize, height as usize, usize::from(self.disparities)))
+        let capacities = Capacities::for_pictures(width as usize, height as usize, usize::from(self.disparities));
+        memory_bytes(&capacities) + (self.measurement.bands - 1) * band_bytes(&capacities)
     }
 
     /// All threads together: the median of a frame by the number of frames that are worked on at once, milliseconds.
@@ -69,6 +70,7 @@ impl Report {
             "memory_bytes": self.memory_bytes(),
             "backend": self.backend.name(),
             "threads": self.measurement.threads,
+            "bands": self.measurement.bands,
             "frames": self.measurement.frames.len(),
             "pictures": self.pictures,
             "width": self.size.0,
@@ -80,7 +82,7 @@ impl Report {
     /// For people.
     pub fn table(&self) -> String {
         let (width, height) = self.size;
-        let Measurement { threads, frames } = &self.measurement;
+        let Measurement { threads, bands, frames } = &self.measurement;
         let mut lines = vec![
             format!("{:<11} {}", "pictures", self.pictures),
             format!("{:<11} {width} × {height} px, {} disparities", "size", self.disparities),
@@ -97,6 +99,10 @@ impl Report {
             let TimeSummary { median_ms, p99_ms, max_ms } = times;
             format!("{name:<11} {median_ms:>10.3} {p99_ms:>10.3} {max_ms:>10.3}")
         };
+        if *bands > 1 {
+            lines
+                .insert(3, format!("{:<11} {bands}, a thread for each; rectify and health are told as match", "bands"));
+        }
         lines.extend(self.stages().into_iter().map(|(name, times)| row(name, times)));
         lines.push(row("total", self.frame_times()));
         if *threads > 1 {

@@ -33,9 +33,9 @@ pub fn bench(args: &BenchArgs, console: &mut Console) -> Result<Ending, Failure>
     let size = pictures.size();
     let settings = config.settings_for(size.0);
     console.note(format_args!("{}: {} pairs in memory", pictures.name, pictures.pairs.len()));
-    let (threads, frames) = (usize::from(args.threads), args.frames as usize);
+    let (threads, bands, frames) = (usize::from(args.threads), usize::from(args.bands), args.frames as usize);
     let backend = args.backend;
-    let job = Job { settings: &settings, wire, backend, file: config.file.as_deref(), threads, frames };
+    let job = Job { settings: &settings, wire, backend, file: config.file.as_deref(), threads, bands, frames };
     let measurement = measure(&pictures, &job)?;
     let report = Report {
         pictures: pictures.name,

@@ -49,7 +49,7 @@ use fencepost_core::{geometry::StereoCalibration, wire::WireConfig};
 use fencepost_hal::{camera::Camera, can::CanBus};
 use serde::Serialize;
 
-use crate::{detector, error::Failure};
+use crate::{crew::Crew, detector, error::Failure};
 use bus::{BusLoop, BusPlan, BusShared};
 use event::Events;
 use exchange::{Bell, Place};
@@ -134,6 +134,7 @@ where
     let bus_loop = BusLoop::new(shared, bus, BusPlan { wire, settings: &settings, sector_width_deg })?;
     // Nobody starts before everybody is ready: a node must not say that it runs before it does.
     let threads = pairs.len() + 1;
+    let threads_per_pair = usize::from(settings.threads_per_pair);
     let start = Barrier::new(threads + 1);
     let called_off = AtomicBool::new(false);
     let (ready_sender, ready) = mpsc::channel();
@@ -148,18 +149,30 @@ where
             pair_threads.push(scope.spawn(move || {
                 let PairPlan { camera, calibration, mount, settings, .. } = plan;
                 let mut detector = detector::lock_one(index);
-                let configured = detector.configure(&settings, &calibration, &mount);
-                if configured.is_ok() {
-                    pair::warm_up(&mut detector, raw_size(&calibration));
-                    // What it saw in the warm-up is forgotten.
-                    let _ = detector.configure(&settings, &calibration, &mount);
-                }
-                let _ = ready.send(configured.map(|()| wishes.ask()).map_err(|error| (index, error)));
+                // Those that help ask for the same priority, and are refused it as this thread is, which says so. A processor is for
+                // one thread to stay on.
+                let helper = ThreadWishes { cpu: None, ..wishes };
+                let configured = detector
+                    .configure(&settings, &calibration, &mount)
+                    .map_err(|error| Failure::config(error, None))
+                    .and_then(|()| Crew::new(index, threads_per_pair, move || drop(helper.ask())));
+                let (told, crew) = match configured {
+                    Ok(mut crew) => {
+                        pair::warm_up(&mut detector, &mut crew, raw_size(&calibration));
+                        // What it saw in the warm-up is forgotten.
+                        let _ = detector.configure(&settings, &calibration, &mount);
+                        (Ok(wishes.ask()), Some(crew))
+                    }
+                    Err(failure) => (Err((index, failure)), None),
+                };
+                let _ = ready.send(told);
                 start.wait();
-                if called_off.load(Ordering::Relaxed) {
-                    return PairReport::default();
+                match crew {
+                    Some(mut crew) if !called_off.load(Ordering::Relaxed) => {
+                        PairLoop { name, camera, place, bell, events, stop, forget_ns }.run(&mut detector, &mut crew)
+                    }
+                    _ => PairReport::default(),
                 }
-                PairLoop { name, camera, place, bell, events, stop, forget_ns }.run(&mut detector)
             }));
         }
         let bus_thread = {
@@ -179,8 +192,7 @@ where
         for message in ready.iter().take(threads) {
             match message {
                 Ok(wishes) => refused.extend(wishes),
-                Err((index, error)) => {
-                    let mut wrong = Failure::config(error, None);
+                Err((index, mut wrong)) => {
                     wrong.what = format!("pair {}: {}", names[index], wrong.what);
                     failure.get_or_insert(wrong);
                 }

@@ -14,7 +14,7 @@ use fencepost_core::{
     settings::Settings,
 };
 use fencepost_hal::{
-    camera::{Camera, CameraError, CameraErrorKind, StereoPair},
+    camera::{Camera, CameraError, CameraErrorKind},
     clock::monotonic_ns,
 };
 use serde::Serialize;
@@ -24,7 +24,7 @@ use super::{
     exchange::{Bell, Place, Trouble},
     latency::{Latency, LatencySummary},
 };
-use crate::detector::ProgramDetector;
+use crate::{crew::Crew, detector::ProgramDetector};
 
 /// Shortest time between two calls of a camera that fails: one that fails at once must not take the whole processor.
 const LEAST_FAILING: Duration = Duration::from_millis(10);
@@ -83,7 +83,7 @@ pub(super) struct PairLoop<'a, C> {
 
 impl<C: Camera> PairLoop<'_, C> {
     /// Looks at pictures until it is told to stop or no further pictures come.
-    pub(super) fn run(mut self, detector: &mut ProgramDetector) -> PairReport {
+    pub(super) fn run(mut self, detector: &mut ProgramDetector, crew: &mut Crew) -> PairReport {
         let mut report = PairReport { name: self.name.to_string(), ..PairReport::default() };
         let (mut delivery, mut detect) = (Latency::new(), Latency::new());
         let mut trouble: Option<(Trouble, u64)> = None;
@@ -100,7 +100,7 @@ impl<C: Camera> PairLoop<'_, C> {
                     detector.forget();
                 }
                 last_exposure_ns = Some(pair.timestamp_ns);
-                look(pair, detector)?;
+                crew.detect(detector, &pair.left, &pair.right, &mut ())?;
                 detect.record(monotonic_ns().saturating_sub(start_ns));
                 place.publish(pair.timestamp_ns, pair.missed, monotonic_ns(), detector.detection());
                 Ok(pair.missed)
@@ -171,10 +171,6 @@ impl<C: Camera> PairLoop<'_, C> {
     }
 }
 
-fn look(pair: &StereoPair<'_>, detector: &mut ProgramDetector) -> Result<(), DetectError> {
-    detector.detect(&pair.left, &pair.right, &mut ()).map(|_| ())
-}
-
 /// A pair that was not looked at, in words; takes no memory.
 struct NotLookedAt(DetectError);
 
@@ -192,11 +188,11 @@ impl fmt::Display for NotLookedAt {
 }
 
 /// Touches all memory that pictures of the configured size use, so that no frame has to wait for it, and forgets what it saw.
-pub(super) fn warm_up(detector: &mut ProgramDetector, size: (u32, u32)) {
+pub(super) fn warm_up(detector: &mut ProgramDetector, crew: &mut Crew, size: (u32, u32)) {
     let (width, height) = (size.0 as usize, size.1 as usize);
     // Something to match and to make surfaces of.
     let pixels: Vec<u8> = (0..width * height).map(|i| ((i * 2_654_435_761) >> 24) as u8).collect();
     if let Ok(picture) = Picture::packed(&pixels, width, height) {
-        let _ = detector.detect(&picture, &picture, &mut ());
+        let _ = crew.detect(detector, &picture, &picture, &mut ());
     }
 }

@@ -1,6 +1,6 @@
 //! Settings of the live loop, `[run]` and `[bus]` in a rig's file.
 
-use fencepost_core::error::ConfigError;
+use fencepost_core::{bands::MAX_BANDS, error::ConfigError};
 use serde::{Deserialize, Serialize};
 
 use super::realtime::check_cpu;
@@ -33,6 +33,9 @@ pub struct RunSettings {
     pub lock_memory: bool,
     /// Processor of the bus thread; any if not set.
     pub bus_cpu: Option<u16>,
+    /// Threads that work on each picture of a pair, 1 to [`MAX_BANDS`]. One leaves the other processors to other work, and takes the
+    /// least time in all.
+    pub threads_per_pair: u8,
 }
 
 impl Default for RunSettings {
@@ -48,6 +51,7 @@ impl Default for RunSettings {
             priority: 50,
             lock_memory: true,
             bus_cpu: None,
+            threads_per_pair: 1,
         }
     }
 }
@@ -70,6 +74,7 @@ impl RunSettings {
         ConfigError::check("run.command_timeout_ms", self.command_timeout_ms as f32, 1.0, 60_000.0)?;
         ConfigError::check("run.echo_timeout_ms", self.echo_timeout_ms as f32, 1.0, 60_000.0)?;
         ConfigError::check("run.priority", f32::from(self.priority), 0.0, 98.0)?;
+        ConfigError::check("run.threads_per_pair", f32::from(self.threads_per_pair), 1.0, MAX_BANDS as f32)?;
         self.bus_cpu.map_or(Ok(()), |cpu| check_cpu("run.bus_cpu", cpu))
     }
 }

@@ -1,7 +1,8 @@
 //! The loop when nothing is wrong.
 
-use std::time::Duration;
+use std::{path::Path, time::Duration};
 
+use fencepost::live::RunSettings;
 use fencepost_core::{
     geometry::Mount,
     wire::{Message, NodeState},
@@ -54,16 +55,24 @@ fn a_live_rig_says_what_replay_writes_for_the_same_pictures() {
     let replayed = fencepost_hal::can::parse_candump(&log).map(|line| line.unwrap().frame);
     let replayed: Vec<_> = replayed.filter(is_of_a_scan).map(|frame| timeless(&frame)).collect();
 
+    // With threads that help, and without.
+    for threads_per_pair in [1, 2] {
+        live_is_as_replayed(&recording, &replayed, threads_per_pair);
+    }
+}
+
+fn live_is_as_replayed(recording: &Path, replayed: &[(u32, Vec<u8>)], threads_per_pair: u8) {
+    let options = options(256, 192, 5);
     let bus = VirtualBus::new(10_000);
     let listener = Listener::on(&bus);
-    let recorded = Recording::open(&recording).unwrap();
+    let recorded = Recording::open(recording).unwrap();
     let (calibration, mount) = (recorded.calibration.stereo, recorded.mount);
     let memory = fencepost_hal::camera::MemoryCamera::fill(&mut recorded.into_camera());
     // Slow enough for every pair to be sent before the next is seen, whatever else the machine does.
     let camera = fencepost_hal::camera::PacedCamera::new(memory, Some(Duration::from_millis(300)));
     let mut plan = pair("front", camera, &options, mount);
     plan.calibration = calibration;
-    let report = start(vec![plan], patient(), &bus).wait();
+    let report = start(vec![plan], RunSettings { threads_per_pair, ..patient() }, &bus).wait();
     assert_eq!((report.bus.scans, report.bus.overtaken, report.bus.sent.whole_scans), (5, 0, 5), "{report:?}");
     let live: Vec<_> = listener.frames().iter().filter(|frame| is_of_a_scan(frame)).map(timeless).collect();
     assert!(live.len() > 5 * 8, "{} frames", live.len());

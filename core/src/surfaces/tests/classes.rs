@@ -93,7 +93,7 @@ fn limits_of_the_classes_are_those_of_the_settings() {
             yz: c.m23 as f32,
             zz: c.m33 as f32,
         };
-        let class = stage.classify(Scatter { weight: 100.0, mean_m: [5.0, 0.0, 0.0], covariance }).class;
+        let class = stage.limits.classify(Scatter { weight: 100.0, mean_m: [5.0, 0.0, 0.0], covariance }).class;
         if (tilt - 20.0).abs() < 0.05 || (tilt - 70.0).abs() < 0.05 {
             continue;
         }
@@ -106,7 +106,7 @@ fn limits_of_the_classes_are_those_of_the_settings() {
     }
     let line = crate::planes::SymmetricMatrix3 { xx: 1.0, ..Default::default() };
     for covariance in [line, crate::planes::SymmetricMatrix3::default()] {
-        let surface = stage.classify(Scatter { weight: 100.0, mean_m: [5.0, 0.0, 0.0], covariance });
+        let surface = stage.limits.classify(Scatter { weight: 100.0, mean_m: [5.0, 0.0, 0.0], covariance });
         assert_eq!((surface.class, surface.normal), (SurfaceClass::Undefined, [0.0; 3]));
     }
 }

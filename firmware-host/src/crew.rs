@@ -1,0 +1,102 @@
+//! The threads of a pair of cameras: the one that asks for obstacles, and those that work on bands of the same picture.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use fencepost_core::{
+    bands::{Job, MAX_BANDS, Workers},
+    detector::{Band, DetectError, Probe},
+    picture::Picture,
+};
+use rayon_core::{ThreadPool, ThreadPoolBuilder};
+
+use crate::{
+    detector::{CELLS, DISPARITIES, ProgramDetector, WIDTH},
+    error::Failure,
+    live::MAX_PAIRS,
+};
+
+/// What the other threads of a pair work with.
+type Bands = [Band<WIDTH, DISPARITIES, CELLS>; MAX_BANDS - 1];
+
+/// Those of each pair, as its detector: pages that are not touched never become memory.
+static BANDS: [Mutex<Bands>; MAX_PAIRS] = [const { Mutex::new([const { Band::new() }; MAX_BANDS - 1]) }; MAX_PAIRS];
+
+/// Looks at the pictures of a pair with as many threads as it is told.
+pub(crate) struct Crew {
+    /// None where the thread that calls works alone.
+    helpers: Option<(MutexGuard<'static, Bands>, Helpers)>,
+}
+
+impl Crew {
+    /// The crew of the detector `index`, below [`MAX_PAIRS`]: the thread that calls this, and others until there are `threads`, at most
+    /// [`MAX_BANDS`]. Each of the others calls `begin` first.
+    ///
+    /// # Errors
+    /// When the operating system gives no threads.
+    pub(crate) fn new(
+        index: usize,
+        threads: usize,
+        begin: impl Fn() + Clone + Send + Sync + 'static,
+    ) -> Result<Self, Failure> {
+        let threads = threads.min(MAX_BANDS);
+        if threads <= 1 {
+            return Ok(Self { helpers: None });
+        }
+        let builder = || {
+            let begin = begin.clone();
+            ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .thread_name(move |helper| format!("pair {index} band {helper}"))
+                .start_handler(move |_| begin())
+        };
+        // A thread that belongs to another crew already has one more do its part.
+        let pool = builder().use_current_thread().build().or_else(|_| builder().build());
+        let pool =
+            pool.map_err(|error| Failure::work(format!("{threads} threads for a pair cannot be had: {error}")))?;
+        let bands = BANDS[index].lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(Self { helpers: Some((bands, Helpers { pool, threads })) })
+    }
+
+    /// Has `detector` look at a pair of pictures; finds the same with any number of threads.
+    ///
+    /// # Errors
+    /// Those of the detector.
+    pub(crate) fn detect(
+        &mut self,
+        detector: &mut ProgramDetector,
+        left: &Picture<'_>,
+        right: &Picture<'_>,
+        probe: &mut impl Probe,
+    ) -> Result<(), DetectError> {
+        match &mut self.helpers {
+            None => detector.detect(left, right, probe).map(|_| ()),
+            Some((bands, helpers)) => {
+                let bands = bands.get_mut(..helpers.threads - 1).unwrap_or_default();
+                detector.detect_in_bands(left, right, bands, helpers, probe).map(|_| ())
+            }
+        }
+    }
+}
+
+/// Threads that wait for work. Nothing is allocated for it.
+struct Helpers {
+    pool: ThreadPool,
+    threads: usize,
+}
+
+impl Workers for Helpers {
+    fn run<J: Job>(&mut self, jobs: &mut [J]) {
+        self.pool.install(|| side_by_side(jobs));
+    }
+}
+
+/// Has one half of the jobs offered to other threads while this one does the other half, and so on.
+fn side_by_side<J: Job>(jobs: &mut [J]) {
+    let (some, others) = jobs.split_at_mut(jobs.len().div_ceil(2));
+    match (some, others) {
+        (some, []) => some.iter_mut().for_each(Job::run),
+        (some, others) => {
+            rayon_core::join(|| side_by_side(some), || side_by_side(others));
+        }
+    }
+}
