@@ -25,6 +25,7 @@ use crate::{
     settings::Settings,
     surfaces::{Surface, Surfaces},
     validate::SurfaceSize,
+    work::{self, Loop},
 };
 use interpreter::Interpreter;
 
@@ -308,6 +309,7 @@ impl<
             }
             let row = self.probe_row.get_mut(..width).unwrap_or_default();
             if self.matcher.pull(margin, row) {
+                work::count(Loop::HealthPixels, row.len());
                 matched += row.iter().filter(|pixel| pixel.has_value()).count();
             }
         }

@@ -1,6 +1,7 @@
 //! The nearest obstacle in each direction.
 
 use super::{CellState, ObstacleMap, UnknownReason};
+use crate::work::{self, Loop};
 
 /// Number of sectors.
 pub const SECTOR_COUNT: usize = 20;
@@ -51,6 +52,7 @@ impl SectorDistances {
         let mut sectors = Self::unknown(width_deg);
         let mut nearest_m = [f32::INFINITY; SECTOR_COUNT];
         let (mut free, mut in_view) = ([0u16; SECTOR_COUNT], [0u16; SECTOR_COUNT]);
+        work::count(Loop::HealthPixels, map.cells.len());
         for (index, cell) in map.cells.iter().enumerate() {
             let (i, j) = map.geometry.cell_at(index);
             let (x, y) = map.geometry.centre_m(i, j);

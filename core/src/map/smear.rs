@@ -1,7 +1,10 @@
 //! Obstacle cells that are only what the matching window smears of the obstacle before them.
 
 use super::{Cell, CellState, MapSettings, ObstacleMap, UnknownReason};
-use crate::geometry::Place;
+use crate::{
+    geometry::Place,
+    work::{self, Loop},
+};
 
 /// Takes out obstacle cells that have few pixels beside an obstacle cell nearer to the pair at `place` in the same direction.
 ///
@@ -24,6 +27,7 @@ pub(super) fn take_out<const CELLS: usize>(map: &mut ObstacleMap<CELLS>, place: 
             let part = 1.0 - f32::from(back) * size / x.max(size);
             let [ahead, aside] = place.to_vehicle([x * part, y * part]);
             [-0.25, 0.25].into_iter().any(|side| {
+                work::count(Loop::MapSmears, 1);
                 let before = geometry.index_at(ahead, aside + side * size).filter(|&before| before != index);
                 let before = before.and_then(|before| map.cells.get(before));
                 before.is_some_and(|before| before.state == CellState::Obstacle && f32::from(before.pixels) >= fewest)

@@ -22,6 +22,7 @@ use crate::{
     arch::{self, Backend, CHUNK, CostJob, Decide, Found, KeyJob, KeyLimits, Search, Sums},
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
+    work::{self, Loop},
 };
 use best::RightBest;
 use columns::Columns;
@@ -156,6 +157,8 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         // Rows above the first filtered one never entered.
         let leaving = newest.checked_sub(window).filter(|&y| y >= first);
         let Self { rows, columns, width, plan, .. } = self;
+        work::count(Loop::MatchFiltered, 3 * *width);
+        work::count(Loop::MatchSlid, (1 + usize::from(leaving.is_some())) * *width * usize::from(self.settings.disparities));
         let evidence = |y| rows.evidence(y, *width, self.settings.prefilter);
         arch::compiled(plan.chosen, SlideEvidence { columns, enter: evidence(newest), leave: leaving.map(evidence) });
         let range = [usize::from(self.settings.disparities), usize::from(self.settings.min_disparity)];
@@ -246,10 +249,13 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if window == Window::Narrow {
             self.right.begin();
         }
+        let mut begun = 0;
         let mut run = first..if window == Window::Narrow { end } else { first };
         loop {
             if run.is_empty() && window == Window::Wide {
-                run = self.weak_run(run.end..end, radius);
+                let most_gap = if begun < SHORT_GAPS { radius / 3 } else { 2 * radius };
+                run = self.weak_run(run.end..end, most_gap);
+                begun += 1;
             }
             if run.is_empty() {
                 break;
@@ -257,6 +263,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             search.follows = search.range.end == run.start && !search.range.is_empty();
             search.range = run.start..run.end.min(run.start + CHUNK);
             run.start = search.range.end;
+            count_chunk(&search, window);
             let (sums, found) = (&mut self.sums, &mut self.found);
             let evidence = self.columns.evidence();
             let weak_texture = decide.weak_texture;
@@ -271,26 +278,30 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if settings.back_check && window == Window::Narrow {
             let (right, plan, tolerance) = (&mut self.right, &self.plan, settings.back_check_px);
             let Some(out) = out.get_mut(first..end) else { return };
+            work::count(Loop::MatchChecked, out.len());
             arch::compiled(plan.chosen, CheckBack { right, plan, tolerance, first, out });
         }
     }
 
-    /// The next run of weak pixels in `range`; gaps that are shorter than it takes to start anew are part of it. Empty if there is
-    /// none.
-    fn weak_run(&self, range: core::ops::Range<usize>, radius: usize) -> core::ops::Range<usize> {
+    /// The next run of weak pixels in `range`; gaps of up to `most_gap` pixels are part of it. Empty if there is none.
+    fn weak_run(&self, range: core::ops::Range<usize>, most_gap: usize) -> core::ops::Range<usize> {
         let weak = self.weak.get(range.clone()).unwrap_or_default();
-        let Some(skipped) = first_weak(weak) else { return range.end..range.end };
+        let Some(skipped) = first_weak(weak) else {
+            work::count(Loop::MatchScanned, weak.len());
+            return range.end..range.end;
+        };
         let (mut end, mut gap) = (skipped, 0);
         for (i, &weak) in weak.iter().enumerate().skip(skipped) {
             if weak {
                 (end, gap) = (i + 1, 0);
             } else {
                 gap += 1;
-                if gap > radius / 3 {
+                if gap > most_gap {
                     break;
                 }
             }
         }
+        work::count(Loop::MatchScanned, end + gap);
         range.start + skipped..range.start + end
     }
 
@@ -316,6 +327,16 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     }
 }
 
+/// Counts the costs that a chunk looks at, and the pixels that are decided on.
+#[inline(always)]
+fn count_chunk(search: &Search, window: Window) {
+    let of = if window == Window::Wide { Loop::MatchWide } else { Loop::MatchNarrow };
+    work::count(of, search.range.len() * search.disparities);
+    let begun = if search.follows { 0 } else { 2 * search.radius + 1 };
+    work::count(Loop::MatchBegun, begun * search.disparities);
+    work::count(Loop::MatchDecided, CHUNK);
+}
+
 /// The first weak pixel; most blocks have none.
 fn first_weak(weak: &[bool]) -> Option<usize> {
     const BLOCK: usize = 32;
@@ -323,6 +344,10 @@ fn first_weak(weak: &[bool]) -> Option<usize> {
     let (block, pixels) = weak.chunks(BLOCK).enumerate().find(|(_, block)| some(block))?;
     Some(block * BLOCK + pixels.iter().position(|&weak| weak)?)
 }
+
+/// Runs of weak pixels in a row that end at a gap that is longer than it takes to start anew. Those that come after have to be farther
+/// apart, as far as a start adds up columns: so no row costs much more than one that is weak all along.
+const SHORT_GAPS: usize = 4;
 
 /// Which of the two windows a row is matched with.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,11 @@
 
 use core::ops::Range;
 
-use crate::{arch::Steps, picture::Picture};
+use crate::{
+    arch::Steps,
+    picture::Picture,
+    work::{self, Loop},
+};
 
 use super::grid::{Grid, PLACE_SHIFT, STEP, Segment};
 
@@ -42,6 +46,7 @@ impl<const NODES: usize> Steps for SampleRow<'_, NODES> {
         let mut runs = Runs::default();
         let mut segments = grid.segments(y);
         let (chunks, rest) = out.as_chunks_mut::<STEP>();
+        work::count(Loop::RectifySegments, chunks.len() + 1);
         let mut begin = 0;
         for chunk in chunks {
             // None beyond the last: the row is longer than the rectified picture.
@@ -116,6 +121,7 @@ impl<'a> Source<'a> {
 
     /// Fills a segment pixel by pixel; `begin` is the column of the first.
     fn fill_each(&self, segment: Segment, begin: usize, out: &mut [u8], runs: &mut Runs) {
+        work::count(Loop::RectifyPixels, out.len());
         let mut place = step(segment.start, [HALF_WEIGHT; 2]);
         for (index, pixel) in out.iter_mut().enumerate() {
             if let Some(value) = self.at(place) {

@@ -19,6 +19,7 @@ use crate::{
     geometry::{DepthTable, Rays},
     links::{changes, piece},
     planes::Scatter,
+    work::{self, Loop},
 };
 use moments::{Moments, RowMoments};
 use tile::{CODE_SHIFT, MAX_SURFACES, NUMBER_MASK, Tile, TileUnion};
@@ -303,6 +304,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         by_size.fill(0);
         for tile in Tile::all(self.width, self.height) {
             let mut pixels = [0u16; MAX_SURFACES];
+            work::count(Loop::SurfaceCounted, tile.width * tile.height);
             for y in tile.y..tile.y + tile.height {
                 for &label in &self.labels[y * self.width + tile.x..][..tile.width] {
                     let label = if CODED { label & NUMBER_MASK } else { label };
@@ -360,8 +362,10 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         for y in 0..tile.height {
             let pixels = pixels.get(row(y)).unwrap_or_default();
             for (label, run) in segments(self.labels.get(row(y)).unwrap_or_default()) {
+                work::count(Loop::SurfaceSegments, 1);
                 if let Some(farthest) = usize::from(label).checked_sub(1).and_then(|i| farthest.get_mut(i)) {
                     let run = pixels.get(run).unwrap_or_default();
+                    work::count(Loop::SurfaceSums, run.len());
                     *farthest = run.iter().fold(*farthest, |least, pixel| least.min(pixel.bits()));
                     count = count.max(usize::from(label));
                 }
@@ -380,6 +384,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             }
             let distances = depth.inverses(&piece(pixels.get(row(y)).unwrap_or_default(), 0));
             for (label, run) in segments(labels) {
+                work::count(Loop::SurfaceSegments, 1);
                 let Some(i) = usize::from(label).checked_sub(1) else { continue };
                 if let (Some(moments), Some(&shift)) = (self.moments.get_mut(i), self.shifts.get(i)) {
                     moments.add(&RowMoments::of_run(&distances, run, u32::from(shift)), v);
@@ -390,6 +395,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         let (mut kept, mut left_out) = (0u8, false);
         let (u, v) = ((tile.x + TILE / 2) as f32, (tile.y + TILE / 2) as f32);
         for (i, number) in renumbered.iter_mut().enumerate().take(count) {
+            work::count(Loop::SurfaceFitted, 1);
             let moments = &self.moments[i];
             let unit_m = depth.scale_m() * (1u32 << self.shifts[i]) as f32;
             let mut surface = self.classify(moments.scatter(rays, u, v, unit_m));
@@ -404,6 +410,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             }
         }
         if left_out {
+            work::count(Loop::SurfaceRelabelled, tile.width * tile.height);
             for y in 0..tile.height {
                 for label in &mut self.labels[row(y)] {
                     *label = usize::from(*label).checked_sub(1).and_then(|i| renumbered.get(i)).copied().unwrap_or(0);

@@ -6,6 +6,7 @@ use super::TILE;
 use crate::{
     geometry::Rays,
     planes::{Scatter, SymmetricMatrix3},
+    work::{self, Loop},
 };
 
 /// Sums over the pixels of a surface inside one tile, with distances `z` in at most 16 bits and pixels `u`, `v` from the
@@ -47,6 +48,7 @@ impl RowMoments {
     pub(super) fn of_run(z: &[u32; TILE], run: Range<usize>, shift: u32) -> Self {
         const MIDDLE: i64 = (TILE / 2) as i64;
         let Range { start, end } = run;
+        work::count(Loop::SurfaceSums, if run.len() < LONG_RUN { run.len() } else { TILE });
         if run.len() < LONG_RUN {
             let z = z.get(run).unwrap_or_default().iter().map(|z| z >> (shift & 31));
             return Self::of(z, end as i32 - MIDDLE as i32);

@@ -6,6 +6,7 @@ use super::{SurfaceSettings, TILE};
 use crate::{
     disparity::DisparityPixel,
     links::{Links, PIECE, each_bit, near, piece, same, shifted},
+    work::{self, Loop},
 };
 
 const _: () = assert!(TILE == PIECE, "a row of a tile is one piece");
@@ -82,6 +83,7 @@ impl TileUnion {
     ) -> u8 {
         let (rows, runs) = self.join_runs::<CODED>(picture, stride, tile, settings, covered, labels);
         // What stands for a surface comes first in it.
+        work::count(Loop::SurfaceStarts, runs);
         for run in 0..runs {
             let root = self.parent[usize::from(self.parent[run])];
             self.parent[run] = root;
@@ -99,6 +101,7 @@ impl TileUnion {
                 break;
             };
             let mut numbers = [0u8; TILE];
+            work::count(Loop::SurfaceNumbers, links.starts().count_ones() as usize);
             for bit in each_bit(links.starts()) {
                 let root = usize::from(self.parent[run % AREA]);
                 run += 1;
@@ -160,12 +163,15 @@ impl TileUnion {
                 codes_above = codes;
             }
             let starts = links.starts();
+            work::count(Loop::SurfaceRows, 1);
+            work::count(Loop::SurfaceStarts, starts.count_ones() as usize);
             for (run, bit) in (runs..AREA).zip(each_bit(starts)) {
                 self.parent[run] = run as u16;
                 self.pixels[run] = length(links.left, bit.trailing_zeros() as usize) as u16;
             }
             // Where both runs go on, so does what is known of them.
             for bit in each_bit(up & !(up << 1 & links.left & links_above.left)) {
+                work::count(Loop::SurfaceJoins, 1);
                 let upto = bit | (bit - 1);
                 let run = runs + (starts & upto).count_ones() as usize;
                 let run_above = first_above + (links_above.starts() & upto).count_ones() as usize;
@@ -191,6 +197,7 @@ impl TileUnion {
             if parent == place {
                 return place;
             }
+            work::count(Loop::SurfaceHops, 1);
             self.parent[place] = self.parent[parent];
             place = usize::from(self.parent[place]);
         }

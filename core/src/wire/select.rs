@@ -3,6 +3,7 @@
 use heapless::VecView;
 
 use crate::map::{Cell, CellState, MapGeometry};
+use crate::work::{self, Loop};
 
 use super::message::{CELL_INDEX_MAX, CELL_INDEX_MIN, HeaderRepr, MAX_RUN_LENGTH, Run};
 
@@ -34,6 +35,7 @@ pub(super) fn select(geometry: &MapGeometry, cells: &[Cell], limit: usize, runs:
     for (row, a) in cells.chunks(columns).zip(0..rows) {
         let i = index(geometry.x_first, a);
         let mut open: Option<Run> = None;
+        work::count(Loop::WireCells, row.len());
         for (b, cell) in row.iter().enumerate() {
             let obstacle = match cell.state {
                 CellState::Unknown(_) => None,
@@ -136,6 +138,7 @@ fn is_higher(heap: &[Run], a: usize, b: usize) -> bool {
 }
 
 fn exchange(heap: &mut [Run], a: usize, b: usize) {
+    work::count(Loop::WireSifts, 1);
     if a < heap.len() && b < heap.len() {
         heap.swap(a, b);
     }
