@@ -219,16 +219,24 @@ impl Shape {
 
     fn obstacles(&self) -> StageWork {
         let mut loops = self.regions(1);
+        let moved = loops[1].1;
         let filling = self.obstacles.min(self.surfaces);
         let passed = self.surfaces * filling - filling * (filling + 1) / 2;
         loops.extend([("surfaces_asked", 3 * self.surfaces), ("obstacles_passed", passed)]);
-        StageWork::sum("obstacles", loops, "1 join + 3 surfaces + surfaces x obstacles")
+        // Surfaces that are joined are one obstacle. Both together are a convex function of the number of regions: the most is where each
+        // surface is a region, or all are one.
+        let total = loops.iter().map(|(_, steps)| steps).sum::<u64>() - moved.min(passed);
+        let formula = "W (H/32 - 1) + H (W/32 - 1) + 7 surfaces + surfaces x obstacles";
+        StageWork { stage: "obstacles", loops, total, formula }
     }
 
     fn map(&self) -> StageWork {
         let rows = self.height * self.width.div_ceil(TILE);
         let geometry = self.settings.map.geometry;
         let cells = geometry.len() as u64;
+        // What is an obstacle has the pixels for it.
+        let least = u64::from(self.settings.map.obstacle_min_pixels.max(1));
+        let obstacles = cells.min(self.pixels() / least);
         let loops = vec![
             ("surfaces", self.surfaces),
             ("rows_of_tiles", rows),
@@ -236,8 +244,8 @@ impl Shape {
             ("noise_filled", rows * TILE * (TILE + 1) / 2),
             ("votes", rows * TILE),
             ("cells", 2 * cells),
-            ("cells_looked_back", cells * 2 * u64::from(self.settings.map.smear_cells)),
-            ("directions", directions(&geometry)),
+            ("cells_looked_back", obstacles * 2 * u64::from(self.settings.map.smear_cells)),
+            ("directions", directions(&geometry, obstacles as usize)),
         ];
         StageWork::sum("map", loops, "H W/32 (1 + 32 + 528 + 32) + surfaces + 6 cells + directions")
     }
@@ -274,12 +282,17 @@ impl Shape {
         let depth = |of: u64| u64::from(of.max(1).ilog2());
         let filling: u64 = (1..=limit).map(depth).sum();
         let sorting: u64 = (1..limit).map(|left| 1 + depth(left)).sum();
+        // Neighbours of one kind are one run. As soon as there are as many obstacles as the list has room for, no free run gets in: more
+        // than the list and one kind for every other cell never do.
+        let columns = u64::from(self.settings.map.geometry.y_count.max(1));
+        let rows = cells / columns;
+        let taken = cells.min(limit + rows * columns.div_ceil(2));
         let loops = vec![
             ("cells", cells),
-            ("sifts", filling + (cells - limit) * depth(limit) + sorting),
+            ("sifts", filling + taken.saturating_sub(limit) * depth(limit) + sorting),
             ("frames", self.wire_frames),
         ];
-        StageWork::sum("wire", loops, "cells + (cells + runs) log2 runs + runs + frames")
+        StageWork::sum("wire", loops, "cells + (cells / 2 + 2 runs) log2 runs + runs + frames")
     }
 }
 
@@ -290,8 +303,8 @@ impl StageWork {
     }
 }
 
-/// Directions that all cells of the map hide, if each is an obstacle and the camera stands at the origin of the map.
-fn directions(geometry: &MapGeometry) -> u64 {
+/// Directions that `obstacles` cells of the map hide at most, if the camera stands at the origin of the map.
+fn directions(geometry: &MapGeometry, obstacles: usize) -> u64 {
     const DIRECTIONS: f32 = 128.0;
     const REACH: f32 = 2.0;
     let half = 0.5 * geometry.cell_size_m();
@@ -309,7 +322,9 @@ fn directions(geometry: &MapGeometry) -> u64 {
         let (low, high) = corners.iter().fold((u64::MAX, 0), |(low, high), &at| (low.min(at), high.max(at)));
         high + 1 - low
     });
-    cells.sum()
+    let mut cells: Vec<u64> = cells.collect();
+    cells.sort_unstable_by(|a, b| b.cmp(a));
+    cells.iter().take(obstacles).sum()
 }
 
 #[cfg(test)]

@@ -76,12 +76,12 @@ impl Genome {
 
     /// A disparity picture in 1/16 px, below `largest`; 0 is a pixel without a value.
     pub(super) fn disparities(&self, (width, height): (usize, usize), largest: u32) -> Vec<u16> {
-        let pattern = Pattern::new(&self.numbers);
+        let pattern = Pattern::new(&self.numbers, height);
         let mut picture: Vec<u16> =
             (0..width * height).map(|i| pattern.steps(i % width, i / width, largest)).collect();
         for &seed in &self.patches {
             let mut random = Random::seeded(seed);
-            let pattern = Pattern::new(&core::array::from_fn(|_| random.next()));
+            let pattern = Pattern::new(&core::array::from_fn(|_| random.next()), height);
             let (x0, y0) = (random.below(width as u32) as usize, random.below(height as u32) as usize);
             let (across, down) = (1 + random.below(48) as usize, 1 + random.below(48) as usize);
             for y in y0..(y0 + down).min(height) {
@@ -135,6 +135,7 @@ impl Genome {
 
 /// A pattern of disparities that repeats.
 struct Pattern {
+    height: usize,
     kind: u32,
     size: [usize; 2],
     skew: usize,
@@ -147,9 +148,10 @@ struct Pattern {
 }
 
 impl Pattern {
-    fn new(n: &[u32; NUMBERS]) -> Self {
+    fn new(n: &[u32; NUMBERS], height: usize) -> Self {
         Self {
-            kind: n[0] % 4,
+            height,
+            kind: n[0] % 5,
             size: [1 + (n[1] % 40) as usize, 1 + (n[2] % 40) as usize],
             skew: (n[3] % 4) as usize,
             levels: 1 + (n[4] % 6) as usize,
@@ -166,14 +168,20 @@ impl Pattern {
         let level = match self.kind {
             // Stripes, checks and steps.
             0 => (x / across + self.skew * (y / down)) % self.levels,
-            // Two combs for each tile, whose teeth lie between each other.
-            1 => match y % 32 {
-                0 => 0,
-                31 => 1,
-                _ => x / (1 + across / 16) % 2,
-            },
+            // Two combs for each tile, whose teeth lie between each other; or stripes, and combs where tiles are cut off.
+            1 => {
+                let is_cut = y / 32 * 32 + 32 > self.height;
+                let last = 31.min(self.height - 1 - y / 32 * 32);
+                match y % 32 {
+                    0 if is_cut || down % 2 == 1 => 0,
+                    row if row == last && (is_cut || down % 2 == 1) => 1,
+                    _ => x / (1 + across / 16) % 2,
+                }
+            }
             // Blocks with a level each.
             2 => scattered(x / across, y / down, 3) as usize % self.levels,
+            // A roof over each tile.
+            3 => 0,
             // Blocks with a seam around each.
             _ => {
                 if x % across == 0 || y % down == 0 {
@@ -185,7 +193,8 @@ impl Pattern {
         if self.holes < 64 && scattered(x, y, 4) % 128 < self.holes {
             return 0;
         }
-        let sloped = (self.slope[0] * x as i32 + self.slope[1] * y as i32) / 8;
+        let along = if self.kind == 3 { y % 32 } else { y };
+        let sloped = (self.slope[0] * x as i32 + self.slope[1] * along as i32) / 8;
         let noise = if self.noise < 32 { scattered(x, y, 5) % self.noise } else { 0 };
         let steps = self.base as i32 + self.step as i32 * level as i32 + sloped + noise as i32;
         steps.clamp(1, largest as i32 - 1) as u16

@@ -54,13 +54,10 @@ pub(crate) fn search(kept: &Worst, rounds: usize, seed: u32, only: Option<&str>)
     for stage in stages.iter().map(|work| work.stage) {
         let mut genomes = kept.0.get(stage).cloned().unwrap_or_default();
         if only.is_none_or(|only| only == stage) && rounds > 0 {
-            // Climbed where a picture costs little time; what is found there is as bad for larger ones.
-            let best = climb(&mut *rigs[0], stage, &genomes, rounds, seed);
-            let before = genomes.first().map_or(0, |genome| total(&mut *rigs[0], stage, genome));
-            if total(&mut *rigs[0], stage, &best) > before {
-                genomes.insert(0, best);
-                genomes.truncate(2);
-            }
+            // What is worst for small pictures need not be so for larger ones: the best for each is kept.
+            let best = rigs.each_mut().map(|rig| climb(&mut **rig, stage, &genomes, rounds, seed));
+            genomes = best.into();
+            genomes.dedup();
         }
         for rig in &mut rigs {
             let found = Found::of(&mut **rig, stage, &genomes);
@@ -75,11 +72,12 @@ pub(crate) fn search(kept: &Worst, rounds: usize, seed: u32, only: Option<&str>)
 fn climb(rig: &mut dyn Rig, stage: &str, known: &[Genome], rounds: usize, seed: u32) -> Genome {
     let mut random = Random::seeded(seed);
     let mut candidates: Vec<Genome> = known.to_vec();
+    let known = candidates.len();
     candidates.extend((0..rounds / 2).map(|_| Genome::random(&mut random)));
     let mut scored: Vec<(u64, Genome)> =
         candidates.into_iter().map(|genome| (total(rig, stage, &genome), genome)).collect();
     scored.sort_by_key(|(steps, _)| std::cmp::Reverse(*steps));
-    scored.truncate(3);
+    scored.truncate(3.max(known));
     for (steps, genome) in &mut scored {
         for _ in 0..rounds / 2 {
             let changed = genome.changed(&mut random);

@@ -114,9 +114,15 @@ macro_rules! rig {
                     self.validate.run(&mut pixels);
                     return work::taken();
                 }
-                let pair = pair($width, $height);
-                let pitch_down_deg = [0.0, 10.0, 30.0, 55.0, -20.0, -55.0][genome.numbers[11] as usize % 6];
-                let height_m = [None, Some(1.0), Some(0.3), Some(4.0)][genome.numbers[11] as usize / 6 % 4];
+                let how = genome.numbers[11] as usize;
+                let mut pair = pair($width, $height);
+                if how / 48 % 2 == 1 {
+                    // Through a long lens, what lies at the end of the terrain has disparities that are fine enough for a slope.
+                    pair.focal_px = 4.0 * $width as f32;
+                    pair.baseline_m = 0.75 * $disparities as f32 * 29.6 / pair.focal_px;
+                }
+                let pitch_down_deg = [0.0, 10.0, 30.0, 55.0, -20.0, -55.0][how % 6];
+                let height_m = Some(0.3 * (how / 6 % 8) as f32).filter(|height_m| *height_m > 0.0);
                 let mount = Mount { height_m, pitch_down_deg, ..Mount::default() };
                 let frame = VehicleFrame::new(&mount).expect("it can be used");
                 let (rays, place) = (Rays::new(&pair, &frame), Place::new(&mount));
@@ -133,8 +139,9 @@ macro_rules! rig {
                 self.ground
                     .configure(&settings.ground, &frame, known, $width * $height)
                     .expect("the defaults can be used");
-                // A second frame has the ground of the first to begin from.
-                for _ in 0..2 {
+                // There is ground to begin from: that of the frame before, which showed nothing else.
+                let level = level(&rays, &pair);
+                for picture in [DisparityPicture::new(&level, $width), picture] {
                     self.surfaces.run(picture, &depth, &rays);
                     work::reset();
                     self.ground.run(&mut self.surfaces, &mut self.regions, picture, (&depth, &rays));
@@ -177,6 +184,19 @@ fn pair(width: usize, height: usize) -> RectifiedPair {
         baseline_m: 0.12,
         disparity_offset_px: 0.0,
     }
+}
+
+/// What level ground looks like.
+fn level(rays: &Rays, pair: &RectifiedPair) -> std::vec::Vec<DisparityPixel> {
+    let (width, height) = (pair.width as usize, pair.height as usize);
+    let pixel = |x: usize, y: usize| {
+        let height_m = |z_m: f32| rays.point_m(x as f32, y as f32, z_m)[2];
+        let (here, ahead) = (height_m(0.0), height_m(1.0));
+        let steps = 16.0 * pair.disparity_px(here / (here - ahead));
+        // Where the ray does not go down there is no ground.
+        if ahead < here { DisparityPixel::from_steps(steps as u16) } else { DisparityPixel::none(Reason::NotUnique) }
+    };
+    (0..width * height).map(|i| pixel(i % width, i / width)).collect()
 }
 
 /// Cameras as `number` says; for rectifying they may be turned, so far that rows of the pair run across those of the picture.
