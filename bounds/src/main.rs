@@ -5,6 +5,7 @@ mod budget;
 mod bus;
 mod figures;
 mod image;
+mod latency;
 mod memory;
 mod painted;
 mod report;
@@ -43,6 +44,13 @@ enum Command {
         /// The budget.
         #[arg(long, default_value = "bounds/budget.toml")]
         budget: PathBuf,
+    },
+    /// Prints how long it takes from the exposure to the last CAN frame on a platform; the exit status is 1 if it does not keep up with
+    /// its camera.
+    Latency {
+        /// What the platform takes; bounds/platforms has an example.
+        #[arg(long)]
+        platform: PathBuf,
     },
     /// Compares the stack that an image was seen to take with what its code can take; the exit status is 1 if it took more, or too
     /// little for the bound to say much.
@@ -120,6 +128,11 @@ fn run(cli: &Cli) -> Result<bool> {
             let findings = budget.compare(&of(images)?);
             print!("{findings}");
             Ok(findings.are_good())
+        }
+        Command::Latency { platform } => {
+            let latency = latency::Platform::read(platform)?.latency()?;
+            print!("{latency}");
+            Ok(latency.keeps_up())
         }
         Command::Painted { image, said } => {
             let painted = painted::Painted::of(image, said)?;

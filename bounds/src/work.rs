@@ -190,8 +190,8 @@ impl Shape {
             ("pixels_counted", pixels),
             ("pixels_relabelled", pixels),
         ];
-        let total = rows + 10 * joins + 9 * firsts + fitted + 2 * pixels;
-        StageWork { stage: "surfaces", loops, total, formula: "H W/32 + 12 W H - W H/32 + surfaces of tiles" }
+        let total = rows + 10 * joins + (17 * firsts).div_ceil(2) + fitted + 2 * pixels;
+        StageWork { stage: "surfaces", loops, total, formula: "H W/32 + 12 W H - 1.5 W H/32 + surfaces of tiles" }
     }
 
     /// The joining of surfaces over the borders of tiles, `times` times.
@@ -280,7 +280,6 @@ impl Shape {
         let cells = self.settings.map.geometry.len() as u64;
         let limit = self.wire_runs.min(cells);
         let depth = |of: u64| u64::from(of.max(1).ilog2());
-        let filling: u64 = (1..=limit).map(depth).sum();
         let sorting: u64 = (1..limit).map(|left| 1 + depth(left)).sum();
         // Neighbours of one kind are one run. As soon as there are as many obstacles as the list has room for, no free run gets in: more
         // than the list and one kind for every other cell never do.
@@ -289,10 +288,10 @@ impl Shape {
         let taken = cells.min(limit + rows * columns.div_ceil(2));
         let loops = vec![
             ("cells", cells),
-            ("sifts", filling + taken.saturating_sub(limit) * depth(limit) + sorting),
+            ("sifts", limit + taken.saturating_sub(limit) * depth(limit) + sorting),
             ("frames", self.wire_frames),
         ];
-        StageWork::sum("wire", loops, "cells + (cells / 2 + 2 runs) log2 runs + runs + frames")
+        StageWork::sum("wire", loops, "cells + (cells / 2 + runs) log2 runs + 2 runs + frames")
     }
 }
 

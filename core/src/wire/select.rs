@@ -84,8 +84,9 @@ fn insert(heap: &mut VecView<Run, u16>, limit: usize, run: Run) -> u32 {
         if heap.push(run).is_err() {
             return u32::from(run.length);
         }
-        let last = heap.len().saturating_sub(1);
-        sift_up(heap, last);
+        if heap.len() >= limit {
+            heapify(heap);
+        }
         return 0;
     }
     match heap.first_mut() {
@@ -100,6 +101,8 @@ fn insert(heap: &mut VecView<Run, u16>, limit: usize, run: Run) -> u32 {
 
 /// Turns the heap into a list with rising ranks: the end of a heap sort.
 fn sort(heap: &mut [Run]) {
+    // It is none yet if there was room for all.
+    heapify(heap);
     for len in (1..heap.len()).rev() {
         exchange(heap, 0, len);
         if let Some(rest) = heap.get_mut(..len) {
@@ -108,14 +111,10 @@ fn sort(heap: &mut [Run]) {
     }
 }
 
-fn sift_up(heap: &mut [Run], mut child: usize) {
-    while child > 0 {
-        let parent = (child - 1) / 2;
-        if !is_higher(heap, child, parent) {
-            return;
-        }
-        exchange(heap, child, parent);
-        child = parent;
+/// Makes a heap of runs in any order, in as many exchanges as there are runs at most (Floyd, *Algorithm 245*, CACM 7(12), 1964).
+fn heapify(heap: &mut [Run]) {
+    for parent in (0..heap.len() / 2).rev() {
+        sift_down(heap, parent);
     }
 }
 
