@@ -190,8 +190,11 @@ impl Shape {
             ("pixels_counted", pixels),
             ("pixels_relabelled", pixels),
         ];
-        let total = rows + 10 * joins + (17 * firsts).div_ceil(2) + fitted + 2 * pixels;
-        StageWork { stage: "surfaces", loops, total, formula: "H W/32 + 12 W H - 1.5 W H/32 + surfaces of tiles" }
+        // A start takes two steps, a number one, two segments, two sums, a join and one or two hops: nine, and a second hop where two
+        // surfaces of its way were joined since. Such a join takes four steps less than a start, and 16 of the 32 pixels of a row can
+        // be on the way of either, once: two of them for a row add 32 - 8 steps, more of them less.
+        let total = rows + (39 * joins).div_ceil(4) + (17 * firsts).div_ceil(2) + fitted + 2 * pixels;
+        StageWork { stage: "surfaces", loops, total, formula: "H W/32 + 11.75 W H - 1.25 W H/32 + surfaces of tiles" }
     }
 
     /// The joining of surfaces over the borders of tiles, `times` times.

@@ -116,10 +116,10 @@ macro_rules! rig {
                 }
                 let how = genome.numbers[11] as usize;
                 let mut pair = pair($width, $height);
-                if how / 48 % 2 == 1 {
+                if let Some((focal, share)) = [None, Some((4.0, 0.65)), Some((8.0, 0.3))][how / 48 % 3] {
                     // Through a long lens, what lies at the end of the terrain has disparities that are fine enough for a slope.
-                    pair.focal_px = 4.0 * $width as f32;
-                    pair.baseline_m = 0.65 * $disparities as f32 * 29.6 / pair.focal_px;
+                    pair.focal_px = focal * $width as f32;
+                    pair.baseline_m = share * $disparities as f32 * 29.6 / pair.focal_px;
                 }
                 let pitch_down_deg = [0.0, 10.0, 30.0, 55.0, -20.0, -55.0][how % 6];
                 let height_m = Some(0.3 * (how / 6 % 8) as f32).filter(|height_m| *height_m > 0.0);
