@@ -56,7 +56,8 @@ impl Platform {
     /// # Errors
     /// The file cannot be read, or says what no platform can be.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read the platform {}", path.display()))?;
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("cannot read the platform {}", path.display()))?;
         Self::parse(&text).with_context(|| format!("the platform {} cannot be used", path.display()))
     }
 

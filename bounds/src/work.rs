@@ -4,11 +4,7 @@
 //! found by the search (`search`), and a row that grows is found by the budget.
 
 use fencepost_core::{
-    detector::Capacities,
-    map::MapGeometry,
-    matching::MatchSettings,
-    settings::Settings,
-    wire::WireConfig,
+    detector::Capacities, map::MapGeometry, matching::MatchSettings, settings::Settings, wire::WireConfig,
 };
 
 /// What decides the bounds.
@@ -320,7 +316,8 @@ fn directions(geometry: &MapGeometry, obstacles: usize) -> u64 {
             let place = ((y / x).clamp(-REACH, REACH) + REACH) * (DIRECTIONS / (2.0 * REACH));
             (place as u64).min(DIRECTIONS as u64 - 1)
         };
-        let corners = [(-half, -half), (-half, half), (half, -half), (half, half)].map(|(dx, dy)| place(y + dy, x + dx));
+        let corners =
+            [(-half, -half), (-half, half), (half, -half), (half, half)].map(|(dx, dy)| place(y + dy, x + dx));
         let (low, high) = corners.iter().fold((u64::MAX, 0), |(low, high), &at| (low.min(at), high.max(at)));
         high + 1 - low
     });

@@ -77,9 +77,9 @@ loops! {
 pub(crate) const fn count(_of: Loop, _steps: usize) {}
 
 #[cfg(feature = "count-work")]
-pub use counting::{reset, taken};
-#[cfg(feature = "count-work")]
 pub(crate) use counting::count;
+#[cfg(feature = "count-work")]
+pub use counting::{reset, taken};
 
 #[cfg(feature = "count-work")]
 mod counting {

@@ -77,8 +77,7 @@ impl Genome {
     /// A disparity picture in 1/16 px, below `largest`; 0 is a pixel without a value.
     pub(super) fn disparities(&self, (width, height): (usize, usize), largest: u32) -> Vec<u16> {
         let pattern = Pattern::new(&self.numbers, height);
-        let mut picture: Vec<u16> =
-            (0..width * height).map(|i| pattern.steps(i % width, i / width, largest)).collect();
+        let mut picture: Vec<u16> = (0..width * height).map(|i| pattern.steps(i % width, i / width, largest)).collect();
         for &seed in &self.patches {
             let mut random = Random::seeded(seed);
             let pattern = Pattern::new(&core::array::from_fn(|_| random.next()), height);
@@ -175,7 +174,7 @@ impl Pattern {
                 match y % 32 {
                     0 if is_cut || down % 2 == 1 => 0,
                     // All but a few stripes are a pixel shorter: there are too many surfaces, and some go in every tile.
-                    0 if down % 4 == 0 && x % 6 != 0 => 2 + x % 2,
+                    0 if down.is_multiple_of(4) && !x.is_multiple_of(6) => 2 + x % 2,
                     row if row == last && (is_cut || down % 2 == 1) => 1,
                     _ => x / (1 + across / 16) % 2,
                 }
@@ -186,7 +185,7 @@ impl Pattern {
             3 => 0,
             // Blocks with a seam around each.
             _ => {
-                if x % across == 0 || y % down == 0 {
+                if x.is_multiple_of(across) || y.is_multiple_of(down) {
                     return 0;
                 }
                 (x / across + self.skew * (y / down)) % self.levels

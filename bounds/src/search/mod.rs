@@ -3,7 +3,10 @@
 mod genome;
 mod rig;
 
-use std::{collections::BTreeMap, fmt::Write, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use anyhow::{Context, Result};
 use fencepost_core::work::LOOPS;
@@ -36,59 +39,35 @@ impl Worst {
     }
 }
 
-/// How near a stage came to its bound.
-struct Found {
-    work: StageWork,
-    /// Steps of the most that was seen of each loop, with whatever picture, and of all together.
-    loops: Vec<u64>,
-    total: u64,
-    best: Genome,
-}
-
 /// Runs what is kept and goes on from it for `rounds` rounds for each stage; returns what to print, whether it is as it must be, and
-/// the worst that was found.
+/// the worst that was found. Every picture that is tried is held against the bounds, not only those that are kept.
 pub(crate) fn search(kept: &Worst, rounds: usize, seed: u32, only: Option<&str>) -> (String, bool, Worst) {
     let (mut text, mut good, mut worst) = (String::new(), true, Worst::default());
     let mut rigs: [Box<dyn Rig>; 2] = [Box::new(Small::new()), Box::new(Robot::new())];
-    let stages = rigs[0].shape().stages();
-    for stage in stages.iter().map(|work| work.stage) {
+    let [small, robot] = rigs.each_ref().map(|rig| rig.shape().stages());
+    for works in small.into_iter().zip(robot).map(|(small, robot)| [small, robot]) {
+        let stage = works[0].stage;
         let mut genomes = kept.0.get(stage).cloned().unwrap_or_default();
+        let mut over = BTreeSet::new();
+        let [small, robot] = &mut rigs;
+        let mut trials = [Trial::new(&mut **small, &works[0]), Trial::new(&mut **robot, &works[1])];
         if only.is_none_or(|only| only == stage) && rounds > 0 {
             // What is worst for small pictures need not be so for larger ones: the best for each is kept.
-            let best = rigs.each_mut().map(|rig| climb(&mut **rig, stage, &genomes, rounds, seed));
+            let best = trials.each_mut().map(|trial| trial.climb(&genomes, rounds, seed));
             genomes = best.into();
             genomes.dedup();
         }
-        for rig in &mut rigs {
-            let found = Found::of(&mut **rig, stage, &genomes);
-            text += &found.text(&rig.shape(), &mut good);
+        for trial in &mut trials {
+            genomes.iter().for_each(|genome| _ = trial.steps(genome));
+            text += &trial.text();
+            over.append(&mut trial.over);
+            good &= trial.share() >= NEAR_PERCENT;
         }
+        good &= over.is_empty();
+        over.iter().for_each(|over| text += &format!("OVER THE BOUND: {over}\n"));
         worst.0.insert(stage.to_owned(), genomes);
     }
     (text, good, worst)
-}
-
-/// The best of a few starts, each changed as long as it does not get better by it.
-fn climb(rig: &mut dyn Rig, stage: &str, known: &[Genome], rounds: usize, seed: u32) -> Genome {
-    let mut random = Random::seeded(seed);
-    let mut candidates: Vec<Genome> = known.to_vec();
-    let known = candidates.len();
-    candidates.extend((0..rounds / 2).map(|_| Genome::random(&mut random)));
-    let mut scored: Vec<(u64, Genome)> =
-        candidates.into_iter().map(|genome| (total(rig, stage, &genome), genome)).collect();
-    scored.sort_by_key(|(steps, _)| std::cmp::Reverse(*steps));
-    scored.truncate(3.max(known));
-    for (steps, genome) in &mut scored {
-        for _ in 0..rounds / 2 {
-            let changed = genome.changed(&mut random);
-            let now = total(rig, stage, &changed);
-            // As many is as good: on a plain one has to walk.
-            if now >= *steps && (now > *steps || changed.patches.len() <= genome.patches.len()) {
-                (*steps, *genome) = (now, changed);
-            }
-        }
-    }
-    scored.into_iter().max_by_key(|(steps, _)| *steps).map(|(_, genome)| genome).unwrap_or_default()
 }
 
 /// Whether a loop belongs to the stage: surfaces are joined for the ground and for the obstacles.
@@ -96,56 +75,134 @@ fn belongs(stage: &str, of: &str) -> bool {
     of == stage || (of == "regions" && (stage == "ground" || stage == "obstacles"))
 }
 
-fn of_stage(stage: &str, taken: &Taken) -> u64 {
-    LOOPS.iter().zip(taken).filter(|((of, _), _)| belongs(stage, of)).map(|(_, steps)| steps).sum()
+/// A stage with one size of pictures, and what was seen of it.
+struct Trial<'a> {
+    rig: &'a mut dyn Rig,
+    work: &'a StageWork,
+    name: String,
+    /// Steps of the most that was seen of each loop, with whatever picture, and of all together.
+    loops: Vec<u64>,
+    total: u64,
+    tried: usize,
+    /// Bounds that were exceeded.
+    over: BTreeSet<String>,
 }
 
-fn total(rig: &mut dyn Rig, stage: &str, genome: &Genome) -> u64 {
-    of_stage(stage, &rig.run(stage, genome))
-}
-
-impl Found {
-    fn of(rig: &mut dyn Rig, stage: &str, genomes: &[Genome]) -> Self {
-        let work = rig.shape().stages().into_iter().find(|work| work.stage == stage).expect("stages are the same");
-        let mut found = Self { loops: vec![0; work.loops.len()], work, total: 0, best: Genome::default() };
-        for genome in genomes {
-            let taken = rig.run(stage, genome);
-            let steps = of_stage(stage, &taken);
-            if steps > found.total {
-                (found.total, found.best) = (steps, genome.clone());
-            }
-            for ((name, _), most) in found.work.loops.iter().zip(&mut found.loops) {
-                let at = LOOPS.iter().position(|(of, loops)| belongs(stage, of) && loops == name);
-                let steps = at.and_then(|at| taken.get(at)).copied().expect("every bounded loop is counted");
-                *most = steps.max(*most);
-            }
-        }
-        found
+impl<'a> Trial<'a> {
+    fn new(rig: &'a mut dyn Rig, work: &'a StageWork) -> Self {
+        let Shape { width, height, disparities, .. } = rig.shape();
+        let name = format!("{width}x{height}x{disparities}.{}", work.stage);
+        Self { rig, work, name, loops: vec![0; work.loops.len()], total: 0, tried: 0, over: BTreeSet::new() }
     }
 
-    fn text(&self, shape: &Shape, good: &mut bool) -> String {
-        let name = format!("{}x{}x{}.{}", shape.width, shape.height, shape.disparities, self.work.stage);
-        let share = |steps: u64, bound: u64| 100.0 * steps as f64 / bound.max(1) as f64;
-        let mut text = String::new();
-        let reached = share(self.total, self.work.total);
-        writeln!(text, "{name:<22} {:>10} of {:>10} steps, {reached:5.1} %", self.total, self.work.total)
-            .expect("a string takes it");
-        for ((loops, bound), steps) in self.work.loops.iter().zip(&self.loops) {
-            writeln!(text, "    {loops:<26} {steps:>10} of {bound:>10}, {:5.1} %", share(*steps, *bound))
-                .expect("a string takes it");
-            if steps > bound {
-                *good = false;
-                text += &format!("OVER THE BOUND: work {name}.{loops}: {steps}, the bound is {bound}\n");
+    /// Steps that the stage takes with the pictures of `genome`.
+    fn steps(&mut self, genome: &Genome) -> u64 {
+        let taken = self.rig.run(self.work.stage, genome);
+        self.take(&taken)
+    }
+
+    /// Holds what was taken against the bounds.
+    fn take(&mut self, taken: &Taken) -> u64 {
+        let of = |of: &str| belongs(self.work.stage, of);
+        let total = LOOPS.iter().zip(taken).filter(|((stage, _), _)| of(stage)).map(|(_, steps)| steps).sum();
+        for ((name, bound), most) in self.work.loops.iter().zip(&mut self.loops) {
+            let at = LOOPS.iter().position(|(stage, loops)| of(stage) && loops == name);
+            let steps = at.and_then(|at| taken.get(at)).copied().expect("every bounded loop is counted");
+            *most = steps.max(*most);
+            if steps > *bound {
+                self.over.insert(format!("work {}.{name}: the bound is {bound}", self.name));
             }
         }
-        if self.total > self.work.total {
-            *good = false;
-            text += &format!("OVER THE BOUND: work {name}: {}, the bound is {}\n", self.total, self.work.total);
+        if total > self.work.total {
+            self.over.insert(format!("work {}: the bound is {}", self.name, self.work.total));
+        }
+        self.total = self.total.max(total);
+        self.tried += 1;
+        total
+    }
+
+    /// The best of a few starts, each changed as long as it does not get better by it.
+    fn climb(&mut self, known: &[Genome], rounds: usize, seed: u32) -> Genome {
+        let mut random = Random::seeded(seed);
+        let mut candidates: Vec<Genome> = known.to_vec();
+        candidates.extend((0..rounds / 2).map(|_| Genome::random(&mut random)));
+        let mut scored: Vec<(u64, Genome)> =
+            candidates.into_iter().map(|genome| (self.steps(&genome), genome)).collect();
+        scored.sort_by_key(|(steps, _)| std::cmp::Reverse(*steps));
+        scored.truncate(3.max(known.len()));
+        for (steps, genome) in &mut scored {
+            for _ in 0..rounds / 2 {
+                let changed = genome.changed(&mut random);
+                let now = self.steps(&changed);
+                // As many is as good: on a plain one has to walk.
+                if now > *steps || (now == *steps && changed.patches.len() <= genome.patches.len()) {
+                    (*steps, *genome) = (now, changed);
+                }
+            }
+        }
+        scored.into_iter().max_by_key(|(steps, _)| *steps).map(|(_, genome)| genome).unwrap_or_default()
+    }
+
+    /// How near the worst came to the bound, percent.
+    fn share(&self) -> f64 {
+        percent(self.total, self.work.total)
+    }
+
+    fn text(&self) -> String {
+        let Self { name, total, work, tried, .. } = self;
+        let reached = self.share();
+        let mut text = format!("{name:<22} {total:>10} of {:>10} steps, {reached:5.1} %; {tried} tried\n", work.total);
+        for ((loops, bound), steps) in work.loops.iter().zip(&self.loops) {
+            text += &format!("    {loops:<26} {steps:>10} of {bound:>10}, {:5.1} %\n", percent(*steps, *bound));
         }
         if reached < NEAR_PERCENT {
-            *good = false;
             text += &format!("SAYS LITTLE: work {name}: the worst that is known takes {reached:.1} % of the bound\n");
         }
         text
+    }
+}
+
+fn percent(steps: u64, bound: u64) -> f64 {
+    100.0 * steps as f64 / bound.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Counts are those of the whole program: one test at a time.
+    static ONE: std::sync::Mutex<()> = std::sync::Mutex::new(());
+
+    #[test]
+    fn a_step_more_than_the_bound_is_told_by_name() {
+        let _one = ONE.lock();
+        let mut rig = Small::new();
+        let mut work = rig.shape().stages().into_iter().find(|work| work.stage == "validate").unwrap();
+        let worst = toml::from_str::<Worst>(include_str!("../../worst.toml")).unwrap();
+        let genome = &worst.0["validate"][0];
+        let mut trial = Trial::new(&mut rig, &work);
+        assert_eq!(trial.steps(genome), work.total);
+        assert!(trial.over.is_empty(), "{:?}", trial.over);
+        // One more loop over the runs than is reckoned with is the same as a bound that is one loop too small.
+        work.loops.iter_mut().find(|(name, _)| *name == "runs").unwrap().1 -= 1;
+        work.total -= 1;
+        let mut trial = Trial::new(&mut rig, &work);
+        trial.steps(genome);
+        let over: Vec<_> = trial.over.iter().map(String::as_str).collect();
+        let expected =
+            ["work 128x96x16.validate.runs: the bound is 12287", "work 128x96x16.validate: the bound is 61695"];
+        assert_eq!(over, expected);
+    }
+
+    #[test]
+    fn random_pictures_stay_within_the_bounds() {
+        let _one = ONE.lock();
+        let mut rig = Small::new();
+        for work in rig.shape().stages() {
+            let mut trial = Trial::new(&mut rig, &work);
+            trial.climb(&[], 60, 77);
+            assert!(trial.over.is_empty(), "{:?}", trial.over);
+            assert!(trial.total > 0, "{}", work.stage);
+        }
     }
 }

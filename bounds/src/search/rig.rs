@@ -4,8 +4,8 @@ use fencepost_core::{
     detector::{Capacities, Detector},
     disparity::{DisparityPicture, DisparityPixel, Reason},
     geometry::{
-        CameraModel, DepthTable, Distortion, Mount, Place, RawPair, Rays, Rectification, RectifiedPair, StereoCalibration,
-        VehicleFrame,
+        CameraModel, DepthTable, Distortion, Mount, Place, RawPair, Rays, Rectification, RectifiedPair,
+        StereoCalibration, VehicleFrame,
     },
     ground::GroundFinder,
     map::{Cell, CellState, MapBuilder, MapGeometry, ObstacleMap, SectorDistances, UnknownReason, View},
@@ -48,10 +48,7 @@ macro_rules! rig {
             >,
             validate: Box<SurfaceSize<$width>>,
             surfaces: Box<
-                Surfaces<
-                    { $width * $height },
-                    { Capacities::for_pictures($width, $height, $disparities).surfaces },
-                >,
+                Surfaces<{ $width * $height }, { Capacities::for_pictures($width, $height, $disparities).surfaces }>,
             >,
             regions: Box<Regions<{ Capacities::for_pictures($width, $height, $disparities).surfaces }>>,
             ground: Box<GroundFinder>,

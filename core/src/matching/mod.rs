@@ -158,7 +158,10 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         let leaving = newest.checked_sub(window).filter(|&y| y >= first);
         let Self { rows, columns, width, plan, .. } = self;
         work::count(Loop::MatchFiltered, 3 * *width);
-        work::count(Loop::MatchSlid, (1 + usize::from(leaving.is_some())) * *width * usize::from(self.settings.disparities));
+        work::count(
+            Loop::MatchSlid,
+            (1 + usize::from(leaving.is_some())) * *width * usize::from(self.settings.disparities),
+        );
         let evidence = |y| rows.evidence(y, *width, self.settings.prefilter);
         arch::compiled(plan.chosen, SlideEvidence { columns, enter: evidence(newest), leave: leaving.map(evidence) });
         let range = [usize::from(self.settings.disparities), usize::from(self.settings.min_disparity)];
