@@ -16,6 +16,8 @@ pub(crate) struct Budget {
     memory: Rows,
     /// Bytes, frames, bits, microseconds, tenths of a percent.
     bus: Rows,
+    /// Steps of loops.
+    work: Rows,
     /// Bytes.
     stack: Rows,
     /// Calls of panics in the checked image, and entries from which one can be reached.
@@ -62,6 +64,7 @@ impl Budget {
             limits,
             memory: figures.memory.clone(),
             bus: figures.bus.clone(),
+            work: figures.work.clone(),
             stack: figures.stack.as_ref().map(|stack| stack.depths.clone()).unwrap_or_default(),
             panics: figures.panics.as_ref().map(|panics| panics.rows()).unwrap_or_default(),
         }
@@ -83,6 +86,7 @@ impl Budget {
         }
         findings.compare("memory", &memory, &figures.memory);
         findings.compare("bus", &self.bus, &figures.bus);
+        findings.compare("work", &self.work, &figures.work);
         match &figures.stack {
             Some(stack) => {
                 findings.compare("stack", &self.stack, &stack.depths);
@@ -177,12 +181,14 @@ mod tests {
         assert!(budget.compare(&figures).are_good(), "{}", budget.compare(&figures));
         *budget.memory.get_mut("320x240x48.map").unwrap() -= 1024;
         *budget.bus.get_mut("message_bytes.Ground").unwrap() -= 1;
+        *budget.work.get_mut("320x240x48.validate.runs").unwrap() -= 1;
         budget.limits.memory_bytes_512x384x64 = 1024;
         let bad = budget.compare(&figures).bad;
-        assert_eq!(bad.len(), 3, "{bad:?}");
+        assert_eq!(bad.len(), 4, "{bad:?}");
         assert!(bad[0].starts_with("memory 320x240x48.map: "), "{bad:?}");
         assert!(bad[1].starts_with("bus message_bytes.Ground: 8"), "{bad:?}");
-        assert!(bad[2].starts_with("memory 512x384x64.whole: "), "{bad:?}");
+        assert!(bad[2].starts_with("work 320x240x48.validate.runs: 76800"), "{bad:?}");
+        assert!(bad[3].starts_with("memory 512x384x64.whole: "), "{bad:?}");
     }
 
     #[test]

@@ -3,11 +3,13 @@
 use std::{collections::BTreeMap, path::Path};
 
 use anyhow::Result;
+use fencepost_core::detector::Capacities;
 
 use crate::{
     bus,
     image::{Analysis, Image},
     memory::{self, Formula, Layout},
+    work::{Shape, StageWork},
 };
 
 /// Rows of a table: a name and a figure.
@@ -21,6 +23,9 @@ pub(crate) struct Figures {
     pub(crate) memory: Rows,
     /// Bytes, frames, bits, microseconds and tenths of a percent, as the names say.
     pub(crate) bus: Rows,
+    /// Steps, by size of the pictures, stage and loop; and the stages for the report.
+    pub(crate) work: Rows,
+    pub(crate) stages: Vec<(&'static str, Vec<StageWork>)>,
     /// From the image; `None` if there is none.
     pub(crate) stack: Option<Stack>,
     /// Calls of panics, by function; `None` without an image.
@@ -52,7 +57,10 @@ impl Figures {
     pub(crate) fn find(image: Option<&Path>, checked: Option<&Path>) -> Result<Self> {
         let layouts = Vec::from(memory::named());
         let formulas = memory::formulas()?;
+        let stages: Vec<_> = layouts.iter().map(|(name, layout)| (*name, shape(layout).stages())).collect();
         let mut figures = Self {
+            work: work_rows(&stages),
+            stages,
             memory: memory_rows(&layouts),
             bus: bus::rows().into_iter().collect(),
             stack: None,
@@ -101,6 +109,24 @@ fn memory_rows(layouts: &[(&'static str, Layout)]) -> Rows {
     for (name, layout) in layouts {
         rows.insert(format!("{name}.whole"), layout.whole as u64);
         rows.extend(layout.parts.iter().map(|part| (format!("{name}.{}", part.name), part.bytes as u64)));
+    }
+    rows
+}
+
+/// What decides the work of a detector of such a size, with the default settings.
+fn shape(layout: &Layout) -> Shape {
+    let Capacities { pixels, width, disparities, .. } = layout.capacities;
+    Shape::of(width, pixels / width, disparities)
+}
+
+fn work_rows(stages: &[(&'static str, Vec<StageWork>)]) -> Rows {
+    let mut rows = Rows::new();
+    for (size, stages) in stages {
+        rows.insert(format!("{size}.whole"), stages.iter().map(|stage| stage.total).sum());
+        for StageWork { stage, loops, total, .. } in stages {
+            rows.insert(format!("{size}.{stage}"), *total);
+            rows.extend(loops.iter().map(|(name, steps)| (format!("{size}.{stage}.{name}"), *steps)));
+        }
     }
     rows
 }

@@ -5,12 +5,18 @@ mod budget;
 mod bus;
 mod figures;
 mod image;
+mod latency;
 mod memory;
 mod painted;
 mod report;
+#[cfg(feature = "search")]
+mod search;
+mod work;
 
 use std::{path::PathBuf, process::ExitCode};
 
+#[cfg(feature = "search")]
+use anyhow::Context;
 use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
 
@@ -39,6 +45,13 @@ enum Command {
         #[arg(long, default_value = "bounds/budget.toml")]
         budget: PathBuf,
     },
+    /// Prints how long it takes from the exposure to the last CAN frame on a platform; the exit status is 1 if it does not keep up with
+    /// its camera.
+    Latency {
+        /// What the platform takes; bounds/platforms has an example.
+        #[arg(long)]
+        platform: PathBuf,
+    },
     /// Compares the stack that an image was seen to take with what its code can take; the exit status is 1 if it took more, or too
     /// little for the bound to say much.
     Painted {
@@ -48,6 +61,26 @@ enum Command {
         /// What it printed, with lines `stack NAME BYTES`.
         #[arg(long)]
         said: PathBuf,
+    },
+    /// Runs the pictures that cost the most against the bounds of the work, and looks for worse ones; the exit status is 1 if a bound
+    /// is exceeded, or says little because nothing comes near to it.
+    #[cfg(feature = "search")]
+    Search {
+        /// The worst that is known.
+        #[arg(long, default_value = "bounds/worst.toml")]
+        worst: PathBuf,
+        /// Pictures to try for each stage, beside those that are known.
+        #[arg(long, default_value_t = 0)]
+        rounds: usize,
+        /// Seed of the search.
+        #[arg(long, default_value_t = 1)]
+        seed: u32,
+        /// Only one stage.
+        #[arg(long)]
+        stage: Option<String>,
+        /// Keeps what was found.
+        #[arg(long)]
+        write: bool,
     },
     /// Prints a budget that is what is found now.
     Budget {
@@ -96,10 +129,25 @@ fn run(cli: &Cli) -> Result<bool> {
             print!("{findings}");
             Ok(findings.are_good())
         }
+        Command::Latency { platform } => {
+            let latency = latency::Platform::read(platform)?.latency()?;
+            print!("{latency}");
+            Ok(latency.keeps_up())
+        }
         Command::Painted { image, said } => {
             let painted = painted::Painted::of(image, said)?;
             print!("{painted}");
             Ok(painted.is_good())
+        }
+        #[cfg(feature = "search")]
+        Command::Search { worst, rounds, seed, stage, write } => {
+            println!("seed {seed}");
+            let (text, good, found) = search::search(&search::Worst::read(worst)?, *rounds, *seed, stage.as_deref());
+            print!("{text}");
+            if *write {
+                std::fs::write(worst, found.to_toml()?).with_context(|| format!("cannot write {}", worst.display()))?;
+            }
+            Ok(good)
         }
         Command::Budget { images, budget } => {
             let limits = budget::Budget::read(budget)?.limits;

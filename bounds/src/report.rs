@@ -5,12 +5,14 @@ use std::fmt::Write;
 use crate::{
     bus::{self, BIT_RATES, FD_RATES, SCAN_RATES_HZ},
     figures::{Figures, Panics, Stack},
+    work::StageWork,
 };
 
 /// Everything that is known.
 pub(crate) fn text(figures: &Figures) -> String {
     let mut text = memory(figures);
     text += &bus(figures);
+    text += &work(figures);
     text += &figures.stack.as_ref().map_or_else(
         || "\nSTACK: not looked at; --image takes what bounds/entries/build has linked\n".to_owned(),
         stack,
@@ -74,6 +76,31 @@ fn bus(figures: &Figures) -> String {
     let ms = row("fd.500kbit_2mbit.scan_us".to_owned()) as f64 / 1000.0;
     let (slow, fast) = FD_RATES;
     text += &format!("  {} kbit/s switched to {} kbit/s: a scan is out after {ms:>6.1} ms\n", slow / 1000, fast / 1000);
+    text
+}
+
+/// Steps of the loops, and the formulas of the stages.
+fn work(figures: &Figures) -> String {
+    let mut text = format!("\nWORK, steps of loops with the default settings, at most\n{:<28}", "");
+    for (name, _) in &figures.stages {
+        write!(text, "{name:>14}").expect("a string takes it");
+    }
+    text += "   formula\n";
+    let Some((_, first)) = figures.stages.first() else { return text };
+    let row = |name: &str, steps: &dyn Fn(&[StageWork]) -> u64| {
+        let mut row = format!("{name:<28}");
+        for (_, stages) in &figures.stages {
+            write!(row, "{:>14}", steps(stages)).expect("a string takes it");
+        }
+        row
+    };
+    for (i, stage) in first.iter().enumerate() {
+        text += &format!("{}   {}\n", row(stage.stage, &|stages| stages[i].total), stage.formula);
+        for (j, (name, _)) in stage.loops.iter().enumerate() {
+            text += &format!("{}\n", row(&format!("  {name}"), &|stages| stages[i].loops[j].1));
+        }
+    }
+    text += &format!("{}   the sum\n", row("whole", &|stages| stages.iter().map(|stage| stage.total).sum()));
     text
 }
 

@@ -38,6 +38,10 @@ pub mod settings;
 pub mod surfaces;
 pub mod validate;
 pub mod wire;
+#[cfg(feature = "count-work")]
+pub mod work;
+#[cfg(not(feature = "count-work"))]
+mod work;
 
 #[cfg(test)]
 mod test_random;

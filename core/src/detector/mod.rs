@@ -27,6 +27,7 @@ use crate::{
     settings::Settings,
     surfaces::{Surface, Surfaces},
     validate::SurfaceSize,
+    work::{self, Loop},
 };
 use interpreter::{Alone, Interpreter};
 
@@ -336,6 +337,7 @@ impl<
             }
             let row = self.probe_row.get_mut(..width).unwrap_or_default();
             if self.matcher.pull(margin, row) {
+                work::count(Loop::HealthPixels, row.len());
                 let values = row.iter().fold(0usize, |count, pixel| count.wrapping_add(usize::from(pixel.has_value())));
                 matched = matched.saturating_add(values);
             }

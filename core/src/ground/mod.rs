@@ -16,6 +16,7 @@ use crate::{
     geometry::{DepthTable, Rays, VehicleFrame},
     planes::{Scatter, SymmetricMatrix3},
     surfaces::{Regions, Surface, SurfaceClass, Surfaces},
+    work::{self, Loop},
 };
 
 /// Rounds of choosing the surfaces near the plane and fitting it again. The choice settles after two or three.
@@ -165,6 +166,7 @@ impl GroundFinder {
         surfaces: &mut Surfaces<PIXELS, SURFACES>,
         regions: &Regions<SURFACES>,
     ) {
+        work::count(Loop::GroundSurfaces, surfaces.table().len().saturating_mul(3));
         for root in regions.roots() {
             let table = surfaces.table();
             let mut on_plane = 0u32;
@@ -229,11 +231,13 @@ impl GroundFinder {
         for _ in 0..REGIONS {
             // The largest region that was not tried yet; the first of equals.
             let mut largest: Option<Scatter> = None;
+            work::count(Loop::GroundSurfaces, table.len());
             for root in regions.roots() {
                 if !table.get(root).is_some_and(|surface| self.may_be_ground(surface, height)) {
                     continue;
                 }
                 let members = regions.members(root).filter_map(|place| table.get(place));
+                let members = members.inspect(|_| work::count(Loop::GroundSurfaces, 1));
                 let members = members.filter(|surface| self.tells_plane(surface, height));
                 let region = members.fold(Scatter::default(), |all, surface| all.joined(&self.weighed(surface, 0.0)));
                 if region.weight < below && largest.is_none_or(|largest| region.weight > largest.weight) {
@@ -265,6 +269,7 @@ impl GroundFinder {
             let tells =
                 |surface: &&Surface| self.tells_plane(surface, height) && near(surface) && noise.allows(surface);
             let mut support = 0u32;
+            work::count(Loop::GroundSurfaces, table.len());
             let mut points = Scatter::default();
             for surface in table.iter().filter(tells) {
                 support = support.saturating_add(surface.pixels());
@@ -309,6 +314,7 @@ impl GroundFinder {
         let camera_m = self.frame.map_or([0.0; 3], |frame| frame.point([0.0; 3]));
         let mean = |most_per_m: f32| {
             let (mut sum, mut weight) = (0.0, 0.0);
+            work::count(Loop::GroundSurfaces, table.len());
             for surface in table.iter().filter(|surface| self.tells_plane(surface, height)) {
                 let shift_per_m = shift_per_m(surface, camera_m).filter(|&shift_per_m| shift_per_m <= most_per_m);
                 if let Some(shift_per_m) = shift_per_m {
@@ -353,6 +359,7 @@ impl GroundFinder {
             let near = x * x + y * y <= self.settings.max_range_m * self.settings.max_range_m;
             near && plane.height_m(surface.points.mean_m) < -self.settings.height_tolerance_m
         };
+        work::count(Loop::GroundSurfaces, table.len());
         let pixels = table.iter().filter(below).map(Surface::pixels).fold(0, u32::saturating_add);
         pixels as f32 <= MOST_BELOW * plane.support as f32
     }

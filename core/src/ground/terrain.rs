@@ -6,6 +6,7 @@ use crate::{
     geometry::{DepthTable, Rays},
     lanes::floor,
     surfaces::{SurfaceClass, Surfaces, TILE},
+    work::{self, Loop},
 };
 
 /// Patches ahead, and to both sides together.
@@ -86,6 +87,7 @@ impl Terrain {
             // Any length does where nothing bends; a detector that is not configured is all zero.
             self.patch_m = 1.0;
         }
+        work::count(Loop::TerrainPatches, AHEAD * ACROSS);
         for lift_m in &mut self.lift_m {
             lift_m.fill(0.0);
         }
@@ -121,6 +123,7 @@ impl Terrain {
                     let end = x0.saturating_add(TILE).min(row.len());
                     for x in (x0..end).step_by(STEP_X) {
                         let (Some(pixel), Some(&label)) = (row.get(x), labels.get(x)) else { break };
+                        work::count(Loop::TerrainPixels, 1);
                         let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(i));
                         let Some(surface) = surface.filter(|surface| surface.class != SurfaceClass::Vertical) else {
                             continue;
@@ -138,6 +141,7 @@ impl Terrain {
 
     /// Makes room for the points of a round.
     fn begin(&mut self) {
+        work::count(Loop::TerrainPatches, 2 * AHEAD * ACROSS);
         for patches in [&mut self.weight, &mut self.sum_m] {
             for row in patches {
                 row.fill(0.0);
@@ -154,6 +158,7 @@ impl Terrain {
     fn settle(&mut self, share: f32) {
         spread(&mut self.weight, share);
         spread(&mut self.sum_m, share);
+        work::count(Loop::TerrainPatches, AHEAD * ACROSS);
         let sums = self.sum_m.as_flattened().iter().zip(self.weight.as_flattened());
         for (lift_m, (sum_m, weight)) in self.lift_m.as_flattened_mut().iter_mut().zip(sums) {
             *lift_m = if *weight > 0.0 { *sum_m / weight } else { 0.0 };
@@ -221,7 +226,10 @@ impl Terrain {
             .or_else(|| Some(level(known(i.wrapping_sub(1), j)?, 0.0, 1)))
             .or_else(|| Some(level(known(i.wrapping_sub(1), inner)?, 1.0, 1)))
             .or_else(|| Some(level(known(i, inner)?, 1.0, 0)))
-            .or_else(|| (2..=i).find_map(|back| Some(level(known(i.checked_sub(back)?, j)?, 0.0, back))));
+            .or_else(|| {
+                let mut backs = (2..=i).inspect(|_| work::count(Loop::TerrainBack, 1));
+                backs.find_map(|back| Some(level(known(i.checked_sub(back)?, j)?, 0.0, back)))
+            });
         let slope = if sure { bend.max_slope } else { 0.0 };
         match around {
             Some((lift_m, patches)) => (lift_m, bend.tolerance_m + slope * patches as f32 * self.patch_m),
@@ -291,6 +299,7 @@ impl Default for Terrain {
 
 /// Adds to every patch the others, each `share` to the power of its distance, along one side and then along the other.
 fn spread(patches: &mut [[f32; ACROSS]; AHEAD], share: f32) {
+    work::count(Loop::TerrainPatches, 6 * AHEAD * ACROSS);
     for row in patches.iter_mut() {
         spread_line(row, share);
     }

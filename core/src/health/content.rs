@@ -12,6 +12,7 @@ use crate::{
     arch::{self, Chosen, Steps},
     disparity::DisparityPixel,
     matching::{Matcher, ValidSpan},
+    work::{self, Loop},
 };
 
 /// What the pictures of one moment say about the cameras, for pictures up to `WIDTH` wide.
@@ -143,6 +144,7 @@ impl<const WIDTH: usize> RowLooks<WIDTH> {
 
     #[inline(always)]
     fn take(&mut self, y: usize, rows: [&[u8]; 2], spans: [ValidSpan; 2]) {
+        work::count(Loop::HealthRows, rows.iter().map(|row| row.len()).sum());
         for (side, (row, span)) in rows.into_iter().zip(spans).enumerate() {
             if let (Some(tiles), Some(profile)) = (self.tiles.get_mut(side), self.profiles.get_mut(side)) {
                 tiles.push(y, row, span);

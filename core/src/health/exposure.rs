@@ -2,7 +2,10 @@
 
 use core::num::NonZeroU64;
 
-use crate::picture::Picture;
+use crate::{
+    picture::Picture,
+    work::{self, Loop},
+};
 
 /// Grey values up to this are dark: what is there drowns in the noise of a cheap sensor.
 const DARK: u8 = 12;
@@ -60,6 +63,7 @@ impl Exposure {
                 count = count.wrapping_add(1);
             }
         }
+        work::count(Loop::HealthPixels, count as usize);
         let each = 1.0 / count.max(1) as f32;
         Self {
             mean: sum as f32 * each,

@@ -26,6 +26,7 @@ use crate::{
     detector::Statistics,
     disparity::{DisparityPicture, DisparityPixel, Reason},
     ground::GroundPlane,
+    work::{self, Loop},
 };
 
 /// Fewer tiles than this are not taken for something on a lens.
@@ -148,6 +149,7 @@ fn out_of_range_below(picture: DisparityPicture<'_>) -> f32 {
     let pixels = picture.pixels();
     let lower = &pixels[pixels.len() / 2..];
     let said = DisparityPixel::none(Reason::OutOfRange);
+    work::count(Loop::HealthPixels, lower.len());
     // Zero reads as out of range, too. In short pieces the count fits 16 bits, as wide as the pixels.
     let is_so = |pixel: &DisparityPixel| u16::from(*pixel == said) | u16::from(pixel.bits() == 0);
     let counts = lower.chunks(4096).map(|piece| usize::from(piece.iter().map(is_so).fold(0u16, u16::wrapping_add)));

@@ -11,6 +11,7 @@ use crate::{
     arch::{self, Chosen, Steps},
     disparity::{DisparityPixel, Reason},
     matching::{Strip, refine},
+    work::{self, Loop},
 };
 
 /// Strips down the picture and places across it at which a match is looked for.
@@ -246,6 +247,7 @@ fn contrasts(strip: &Strip<'_, { 2 * MARGIN + 1 }>, row: &[DisparityPixel], part
     let rows = [MARGIN - 1, MARGIN, MARGIN + 1].map(|y| strip.left.get(y).copied().unwrap_or_default());
     let mut best = (0, None);
     for first in part.clone().step_by(LANES) {
+        work::count(Loop::HealthPlaces, LANES);
         // One more to either side of the lanes.
         let [above, middle, below] = rows.map(|row| window::<{ LANES + 2 }>(row, first.saturating_sub(1)));
         let steps = |a: u8, b: u8| u16::from(a.abs_diff(b));
@@ -357,6 +359,7 @@ fn least_cost(
     // From the smallest disparity on, which wins where several fit alike.
     while upto > first {
         let from = upto.saturating_sub(LANES).max(first);
+        work::count(Loop::HealthCosts, LANES);
         let costs = costs(strip, x, from, down);
         let lanes = upto.wrapping_sub(from);
         let least = costs.iter().take(lanes).copied().min().unwrap_or(u16::MAX);

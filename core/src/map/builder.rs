@@ -11,6 +11,7 @@ use crate::{
     geometry::{DepthTable, Place, Rays, RectifiedPair, VehicleFrame},
     ground::Terrain,
     surfaces::{MAX_TILE_SURFACES, Surfaces},
+    work::{self, Loop},
 };
 
 /// How the left camera sees the world.
@@ -181,6 +182,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         let geometry = self.settings.geometry;
         map.geometry = geometry;
         map.cells.clear();
+        work::count(Loop::MapCells, geometry.len());
         for (index, evidence) in (0..geometry.len()).zip(&self.evidence) {
             let cell = self.decide(index, evidence, picture, view, ground, ground_seen);
             // Cannot fail: `configure` made sure that there is room.

@@ -1,6 +1,7 @@
 //! The nearest obstacle in each direction.
 
 use super::{CellState, ObstacleMap, UnknownReason};
+use crate::work::{self, Loop};
 
 /// Number of sectors.
 pub const SECTOR_COUNT: usize = 20;
@@ -50,6 +51,7 @@ impl SectorDistances {
     pub fn of<const CELLS: usize>(map: &ObstacleMap<CELLS>, width_deg: f32) -> Self {
         let mut sectors = Self::unknown(width_deg);
         let mut seen = [Seen::NOTHING; SECTOR_COUNT];
+        work::count(Loop::HealthPixels, map.cells.len());
         for (index, cell) in map.cells.iter().enumerate() {
             let (i, j) = map.geometry.cell_at(index);
             let (x, y) = map.geometry.centre_m(i, j);

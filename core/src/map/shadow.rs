@@ -1,7 +1,10 @@
 //! Cells behind obstacles.
 
 use super::{CellState, ObstacleMap, UnknownReason};
-use crate::geometry::Place;
+use crate::{
+    geometry::Place,
+    work::{self, Loop},
+};
 
 /// Number of directions that are told apart.
 const DIRECTIONS: usize = 128;
@@ -35,10 +38,12 @@ pub(super) fn mark<const CELLS: usize>(map: &mut ObstacleMap<CELLS>, place: &Pla
         let [x, _] = at(index, 0.0, 0.0);
         let directions = corners.map(|[x, y]| direction(y, x));
         let (right, left) = directions.iter().fold((DIRECTIONS - 1, 0), |(low, high), &d| (low.min(d), high.max(d)));
+        work::count(Loop::MapShadows, (left + 1).saturating_sub(right));
         for nearest in nearest_x.iter_mut().take(left + 1).skip(right) {
             *nearest = nearest.min(x);
         }
     }
+    work::count(Loop::MapCells, map.cells.len());
     for (index, cell) in map.cells.iter_mut().enumerate() {
         let [x, y] = at(index, 0.0, 0.0);
         let unseen = matches!(

@@ -1,7 +1,10 @@
 //! Obstacle cells that are only what the matching window smears of the obstacle before them.
 
 use super::{Cell, CellState, MapSettings, ObstacleMap, UnknownReason};
-use crate::geometry::Place;
+use crate::{
+    geometry::Place,
+    work::{self, Loop},
+};
 
 /// Takes out obstacle cells that have few pixels beside the obstacle cells nearer to the pair at `place` in the same direction.
 ///
@@ -24,6 +27,7 @@ pub(super) fn take_out<const CELLS: usize>(map: &mut ObstacleMap<CELLS>, place: 
         let smears = (1..=settings.smear_cells).any(|back| {
             let part = 1.0 - f32::from(back) * size / x.max(size);
             let [ahead, aside] = place.to_vehicle([x * part, y * part]);
+            work::count(Loop::MapSmears, 2);
             let [right, left] = [-0.5, 0.5].map(|side| geometry.index_at(ahead, aside + side * part * size));
             let pixels = |before: Option<usize>| {
                 let before = before.filter(|&before| before != index).and_then(|before| map.cells.get(before));

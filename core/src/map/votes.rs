@@ -10,6 +10,7 @@ use crate::{
     lanes::floor,
     links::{PIECE, Piece, changes, each_bit},
     surfaces::{MAX_TILE_SURFACES, Surface, SurfaceClass, Surfaces, TILE},
+    work::{self, Loop},
 };
 
 const _: () = assert!(TILE == PIECE, "a row of a tile is one piece");
@@ -100,6 +101,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
                 if found.is_empty() {
                     continue;
                 }
+                work::count(Loop::MapSurfaces, found.len());
                 for (common, surface) in self.common.iter_mut().zip(found) {
                     *common = Common::of(surface, self.ground);
                 }
@@ -133,6 +135,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
         if labels == [0; TILE] {
             return;
         }
+        work::count(Loop::MapRows, 1);
         let pixels = crate::links::piece(row, x0);
         let rays = self.view.rays;
         let plane = self.ground.plane();
@@ -165,6 +168,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
         let focal_baseline_px_m = pair.focal_px * pair.baseline_m;
         let mut roles = Roles::default();
         let changes = changes(labels);
+        work::count(Loop::MapRuns, changes.count_ones() as usize);
         for bit in each_bit(changes) {
             let first = bit.trailing_zeros();
             let label = labels.get(first as usize).copied().unwrap_or(0);
@@ -184,6 +188,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             let drop = at(0) * nx + at(1) * ny + at(2) * nz;
             let noise = self.settings.height_noise_px * drop.abs() / focal_baseline_px_m;
             // All that follow: the next run has its own.
+            work::count(Loop::MapNoise, TILE.saturating_sub(first as usize));
             noise_per_m2.get_mut(first as usize..).unwrap_or_default().fill(noise);
         }
         roles
@@ -265,6 +270,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
     #[inline(always)]
     fn count(&mut self, keys: &[u16; TILE], heights_dm: &[u8; TILE]) {
         let changes = changes(keys);
+        work::count(Loop::MapVotes, changes.count_ones() as usize);
         for bit in each_bit(changes) {
             let first = bit.trailing_zeros() as usize;
             let after = changes & !(bit | (bit - 1));

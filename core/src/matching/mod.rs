@@ -23,6 +23,7 @@ use crate::{
     arch::{self, Backend, CHUNK, CostJob, Decide, Found, KeyJob, KeyLimits, Search, Sums},
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
+    work::{self, Loop},
 };
 use best::RightBest;
 use columns::Columns;
@@ -157,6 +158,13 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         // Rows above the first filtered one never entered.
         let leaving = newest.checked_sub(window).filter(|&y| y >= first);
         let Self { rows, columns, width, plan, .. } = self;
+        work::count(Loop::MatchFiltered, width.saturating_mul(3));
+        work::count(
+            Loop::MatchSlid,
+            (1 + usize::from(leaving.is_some()))
+                .saturating_mul(*width)
+                .saturating_mul(usize::from(self.settings.disparities)),
+        );
         let evidence = |y| rows.evidence(y, *width, self.settings.prefilter);
         arch::compiled(plan.chosen, SlideEvidence { columns, enter: evidence(newest), leave: leaving.map(evidence) });
         let range = [usize::from(self.settings.disparities), usize::from(self.settings.min_disparity)];
@@ -250,10 +258,13 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if window == Window::Narrow {
             self.right.begin();
         }
+        let mut begun = 0;
         let mut run = first..if window == Window::Narrow { end } else { first };
         loop {
             if run.is_empty() && window == Window::Wide {
-                run = self.weak_run(run.end..end, radius);
+                let most_gap = if begun < SHORT_GAPS { radius / 3 } else { 2 * radius };
+                run = self.weak_run(run.end..end, most_gap);
+                begun += 1;
             }
             if run.is_empty() {
                 break;
@@ -261,6 +272,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             search.follows = search.range.end == run.start && !search.range.is_empty();
             search.range = run.start..run.end.min(run.start.saturating_add(CHUNK));
             run.start = search.range.end;
+            count_chunk(&search, window);
             let (sums, found) = (&mut self.sums, &mut self.found);
             let evidence = self.columns.evidence();
             let weak_texture = decide.weak_texture;
@@ -275,26 +287,30 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if settings.back_check && window == Window::Narrow {
             let (right, plan, tolerance) = (&mut self.right, &self.plan, settings.back_check_px);
             let Some(out) = out.get_mut(first..end) else { return };
+            work::count(Loop::MatchChecked, out.len());
             arch::compiled(plan.chosen, CheckBack { right, plan, tolerance, first, out });
         }
     }
 
-    /// The next run of weak pixels in `range`; gaps that are shorter than it takes to start anew are part of it. Empty if there is
-    /// none.
-    fn weak_run(&self, range: core::ops::Range<usize>, radius: usize) -> core::ops::Range<usize> {
+    /// The next run of weak pixels in `range`; gaps of up to `most_gap` pixels are part of it. Empty if there is none.
+    fn weak_run(&self, range: core::ops::Range<usize>, most_gap: usize) -> core::ops::Range<usize> {
         let weak = self.weak.get(range.clone()).unwrap_or_default();
-        let Some(skipped) = first_weak(weak) else { return range.end..range.end };
+        let Some(skipped) = first_weak(weak) else {
+            work::count(Loop::MatchScanned, weak.len());
+            return range.end..range.end;
+        };
         let (mut end, mut gap) = (skipped, 0usize);
         for (i, &weak) in (1..=weak.len()).zip(weak).skip(skipped) {
             if weak {
                 (end, gap) = (i, 0);
             } else {
                 gap = gap.saturating_add(1);
-                if gap > radius / 3 {
+                if gap > most_gap {
                     break;
                 }
             }
         }
+        work::count(Loop::MatchScanned, end.saturating_add(gap));
         // Within the range.
         range.start.wrapping_add(skipped)..range.start.wrapping_add(end)
     }
@@ -321,6 +337,16 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     }
 }
 
+/// Counts the costs that a chunk looks at, and the pixels that are decided on.
+#[inline(always)]
+fn count_chunk(search: &Search, window: Window) {
+    let of = if window == Window::Wide { Loop::MatchWide } else { Loop::MatchNarrow };
+    work::count(of, search.range.len().saturating_mul(search.disparities));
+    let begun = if search.follows { 0 } else { search.radius.saturating_mul(2).saturating_add(1) };
+    work::count(Loop::MatchBegun, begun.saturating_mul(search.disparities));
+    work::count(Loop::MatchDecided, CHUNK);
+}
+
 /// The first weak pixel; most blocks have none.
 fn first_weak(weak: &[bool]) -> Option<usize> {
     const BLOCK: usize = 32;
@@ -329,6 +355,10 @@ fn first_weak(weak: &[bool]) -> Option<usize> {
     let (first, pixels) = blocks.find(|(_, block)| some(block))?;
     pixels.iter().position(|&weak| weak)?.checked_add(first)
 }
+
+/// Runs of weak pixels in a row that end at a gap that is longer than it takes to start anew. Those that come after have to be farther
+/// apart, as far as a start adds up columns: so no row costs much more than one that is weak all along.
+const SHORT_GAPS: usize = 4;
 
 /// Which of the two windows a row is matched with.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -15,6 +15,7 @@ use crate::{
     ground::Terrain,
     planes::{Scatter, SymmetricMatrix3},
     surfaces::{Regions, Surface, SurfaceClass, Surfaces},
+    work::{self, Loop},
 };
 
 /// One obstacle.
@@ -100,16 +101,19 @@ impl ObstacleFinder {
         obstacles.clear();
         let mut dropped = 0u32;
         regions.join(surfaces, picture, |surface| self.stands_up(surface, ground));
+        work::count(Loop::ObstacleSurfaces, surfaces.table().len());
         for root in regions.roots() {
             let table = surfaces.table();
             if !table.get(root).is_some_and(|surface| self.stands_up(surface, ground)) {
                 continue;
             }
             let members = regions.members(root).filter_map(|place| table.get(place));
+            let members = members.inspect(|_| work::count(Loop::ObstacleSurfaces, 1));
             let Some(obstacle) = self.measure(members, ground, place) else {
                 continue;
             };
             for member in regions.members(root) {
+                work::count(Loop::ObstacleSurfaces, 1);
                 if let Some(surface) = surfaces.table_mut().get_mut(member) {
                     surface.class = SurfaceClass::Obstacle;
                 }
@@ -222,6 +226,8 @@ fn within_half_turn(angle_rad: f32) -> f32 {
 fn insert<const N: usize>(obstacles: &mut Vec<Obstacle, N, u16>, obstacle: Obstacle) -> u32 {
     let distance = obstacle.distance_m();
     let place = obstacles.iter().position(|other| other.distance_m() > distance).unwrap_or(obstacles.len());
+    // Those that are nearer were passed, those that are farther make room.
+    work::count(Loop::ObstaclesPassed, obstacles.len());
     let mut moved = obstacle;
     for listed in obstacles.iter_mut().skip(place) {
         core::mem::swap(listed, &mut moved);

@@ -2,7 +2,11 @@
 
 use core::ops::Range;
 
-use crate::{arch::Steps, picture::Picture};
+use crate::{
+    arch::Steps,
+    picture::Picture,
+    work::{self, Loop},
+};
 
 use super::grid::{Grid, PLACE_SHIFT, STEP, Segment};
 
@@ -42,6 +46,7 @@ impl<const NODES: usize> Steps for SampleRow<'_, NODES> {
         let mut runs = Runs::default();
         let mut segments = grid.segments(y);
         let (chunks, rest) = out.as_chunks_mut::<STEP>();
+        work::count(Loop::RectifySegments, chunks.len().saturating_add(1));
         let mut begin = 0usize;
         for chunk in chunks {
             // None beyond the last: the row is longer than the rectified picture.
@@ -117,6 +122,7 @@ impl<'a> Source<'a> {
 
     /// Fills a segment pixel by pixel; `begin` is the column of the first.
     fn fill_each(&self, segment: Segment, begin: usize, out: &mut [u8], runs: &mut Runs) {
+        work::count(Loop::RectifyPixels, out.len());
         let mut place = step(segment.start, [HALF_WEIGHT; 2]);
         let mut column = begin;
         for pixel in out {

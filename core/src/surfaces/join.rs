@@ -1,16 +1,22 @@
 //! Joining surfaces over the whole picture.
 
 use super::{Surface, Surfaces, TILE};
-use crate::disparity::DisparityPicture;
+use crate::{
+    disparity::DisparityPicture,
+    work::{self, Loop},
+};
 
-/// Union-find over surfaces: which of them hang together.
+/// Which surfaces hang together.
+///
+/// Every surface knows which one stands for its region, so that asking is one step. Where two regions become one, the smaller is told
+/// anew: a surface is told at most as often as regions can double.
 ///
 /// Inside a tile a surface is connected already, and what is joined is chosen by surface, so only neighbours across the
 /// borders of the tiles need to be looked at. The result is that of union-find over all pixels. Source: the paper,
 /// section 4.4.
 pub struct Regions<const SURFACES: usize> {
     parent: [u16; SURFACES],
-    /// The next surface of the same region, the surface itself at the end.
+    /// The next surface of the same region, the surface itself at the end; while regions are joined, the first after the last.
     next: [u16; SURFACES],
     len: usize,
 }
@@ -24,15 +30,16 @@ impl<const SURFACES: usize> Regions<SURFACES> {
     /// Joins the surfaces that `takes_part` and touch: neighbouring pixels of contiguous disparity.
     ///
     /// # Bound
-    /// `width x height / 16` pairs of pixels.
+    /// `width x height / 16` pairs of pixels; each surface is told of another region at most `log2 SURFACES` times.
     pub fn join<const PIXELS: usize>(
         &mut self,
         surfaces: &Surfaces<PIXELS, SURFACES>,
         picture: DisparityPicture<'_>,
         takes_part: impl Fn(&Surface) -> bool,
     ) {
-        for (place, parent) in self.parent.iter_mut().enumerate() {
-            *parent = place as u16;
+        work::count(Loop::RegionPlaces, SURFACES);
+        for (place, (parent, next)) in self.parent.iter_mut().zip(&mut self.next).enumerate() {
+            (*parent, *next) = (place as u16, place as u16);
         }
         let (width, height) = (picture.width(), picture.height());
         let table = surfaces.table();
@@ -71,6 +78,7 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         let reach = surfaces.settings().step_sixteenths;
         // Neighbours along the border mostly belong to the same two surfaces, which are joined but once.
         let mut last = (0, 0);
+        work::count(Loop::RegionPairs, border.length);
         for i in 0..border.length {
             // Within the picture, as its own length says.
             let behind = border.first.wrapping_add(i.wrapping_mul(border.step));
@@ -108,14 +116,21 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         })
     }
 
-    /// Chains the surfaces of each region, last to first.
+    /// Lets the first surface of each region stand for it, and chains the surfaces of each region.
     fn chain(&mut self, len: usize) {
         self.len = len.min(SURFACES);
-        for place in (0..self.len).rev() {
-            let root = self.root(place);
-            if let (Some(parent), Some(next)) = (self.parent.get_mut(place), self.next.get_mut(place)) {
-                (*parent, *next) = (root as u16, place as u16);
+        work::count(Loop::RegionPlaces, self.len.saturating_mul(3));
+        self.next.fill(NONE);
+        for place in 0..self.len {
+            let Some(parent) = self.parent.get_mut(place) else { break };
+            // The first that is asked is the first of its region. What stood for the region so far remembers it.
+            if let Some(first) = self.next.get_mut(usize::from(*parent)) {
+                *first = if *first == NONE { place as u16 } else { *first };
+                *parent = *first;
             }
+        }
+        for (place, next) in self.next.iter_mut().enumerate().take(self.len) {
+            *next = place as u16;
         }
         // A root is the first of its region, so everything can be hung in right behind it, from the end on.
         for place in (0..self.len).rev() {
@@ -131,30 +146,49 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         }
     }
 
-    /// The surface that stands for the region of surface `place`.
-    pub fn root(&mut self, mut place: usize) -> usize {
-        while let Some(&parent) = self.parent.get(place) {
-            let parent = usize::from(parent);
-            if parent == place {
-                break;
-            }
-            // Every other one is hung one higher on the way, so that the next way is half as long.
-            let Some(&above) = self.parent.get(parent) else { break };
-            if let Some(halved) = self.parent.get_mut(place) {
-                *halved = above;
-            }
-            place = usize::from(above);
-        }
-        place
+    /// The surface that stands for the region of surface `place`; itself where there is no such surface.
+    pub fn root(&self, place: usize) -> usize {
+        self.parent.get(place).map_or(place, |&parent| usize::from(parent))
     }
 
+    /// Makes one region of those of two surfaces.
     fn unite(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
-        if let Some(parent) = self.parent.get_mut(a.max(b)) {
-            *parent = a.min(b) as u16;
+        if a == b {
+            return;
+        }
+        // Both are gone round at the same time: that which ends first is the smaller one.
+        let after = |next: &[u16; SURFACES], place: usize| next.get(place).map_or(place, |&next| usize::from(next));
+        let (mut of_a, mut of_b) = (after(&self.next, a), after(&self.next, b));
+        while of_a != a && of_b != b {
+            work::count(Loop::RegionMoved, 1);
+            (of_a, of_b) = (after(&self.next, of_a), after(&self.next, of_b));
+        }
+        let (keep, give) = if of_b == b { (a, b) } else { (b, a) };
+        let mut place = give;
+        loop {
+            work::count(Loop::RegionMoved, 1);
+            if let Some(parent) = self.parent.get_mut(place) {
+                *parent = keep as u16;
+            }
+            place = after(&self.next, place);
+            if place == give {
+                break;
+            }
+        }
+        if let (Some(&keeps), Some(&gives)) = (self.next.get(keep), self.next.get(give)) {
+            if let Some(next) = self.next.get_mut(keep) {
+                *next = gives;
+            }
+            if let Some(next) = self.next.get_mut(give) {
+                *next = keeps;
+            }
         }
     }
 }
+
+/// No surface.
+const NONE: u16 = u16::MAX;
 
 /// Pixels along the border of a tile, as places in the picture.
 struct Border {

@@ -21,6 +21,7 @@ use crate::{
     geometry::{DepthTable, Rays},
     links::{changes, piece},
     planes::Scatter,
+    work::{self, Loop},
 };
 use moments::{Moments, RowMoments};
 pub(crate) use part::TileWork;
@@ -307,6 +308,7 @@ impl Part<'_> {
         by_size.fill(0);
         for tile in Tile::all(self.width, self.height) {
             let mut pixels = [0u16; MAX_SURFACES];
+            work::count(Loop::SurfaceCounted, tile.width.saturating_mul(tile.height));
             for y in 0..tile.height {
                 for &label in self.labels.get(tile.row(y, self.width)).unwrap_or_default() {
                     let label = if CODED { label & NUMBER_MASK } else { label };
@@ -366,8 +368,10 @@ impl Part<'_> {
         for y in 0..tile.height {
             let pixels = pixels.get(row(y)).unwrap_or_default();
             for (label, run) in segments(self.labels.get(row(y)).unwrap_or_default()) {
+                work::count(Loop::SurfaceSegments, 1);
                 if let Some(farthest) = usize::from(label).checked_sub(1).and_then(|i| farthest.get_mut(i)) {
                     let run = pixels.get(run).unwrap_or_default();
+                    work::count(Loop::SurfaceSums, run.len());
                     *farthest = run.iter().fold(*farthest, |least, pixel| least.min(pixel.bits()));
                     count = count.max(usize::from(label));
                 }
@@ -389,6 +393,7 @@ impl Part<'_> {
             }
             let distances = depth.inverses(&piece(pixels.get(row(y)).unwrap_or_default(), 0));
             for (label, run) in segments(labels) {
+                work::count(Loop::SurfaceSegments, 1);
                 let Some(i) = usize::from(label).checked_sub(1) else { continue };
                 if let (Some(moments), Some(&shift)) = (self.moments.get_mut(i), self.shifts.get(i)) {
                     moments.add(&RowMoments::of_run(&distances, run, u32::from(shift)), v);
@@ -399,6 +404,7 @@ impl Part<'_> {
         let (mut kept, mut left_out) = (0u8, false);
         let [u, v] = [tile.x, self.top.wrapping_add(tile.y)].map(|first| first.wrapping_add(TILE / 2) as f32);
         for (i, number) in renumbered.iter_mut().enumerate().take(count) {
+            work::count(Loop::SurfaceFitted, 1);
             let (moments, shift) = (&self.moments[i], u32::from(self.shifts[i]));
             let unit_m = depth.scale_m() * (1u32 << (shift & 31)) as f32;
             let mut surface = self.limits.classify(moments.scatter(rays, u, v, unit_m));
@@ -413,6 +419,7 @@ impl Part<'_> {
             }
         }
         if left_out {
+            work::count(Loop::SurfaceRelabelled, tile.width.saturating_mul(tile.height));
             for y in 0..tile.height {
                 for label in self.labels.get_mut(row(y)).unwrap_or_default() {
                     *label = usize::from(*label).checked_sub(1).and_then(|i| renumbered.get(i)).copied().unwrap_or(0);

@@ -6,6 +6,7 @@ use super::TILE;
 use crate::{
     geometry::Rays,
     planes::{Scatter, SymmetricMatrix3},
+    work::{self, Loop},
 };
 
 /// Sums over the pixels of a surface inside one tile, with distances `z` in at most 16 bits and pixels `u`, `v` from the
@@ -55,6 +56,7 @@ impl RowMoments {
         const WIDE: Sum = Wrapping(MIDDLE);
         let Range { start, end } = run;
         let length = run.len();
+        work::count(Loop::SurfaceSums, if length < LONG_RUN { length } else { TILE });
         if length < LONG_RUN {
             let z = z.get(run).unwrap_or_default().iter().map(|z| z >> (shift & 31));
             return Self::of(z, end as i32 - MIDDLE as i32);

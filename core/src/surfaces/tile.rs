@@ -6,6 +6,7 @@ use super::{SurfaceSettings, TILE};
 use crate::{
     disparity::DisparityPixel,
     links::{Links, PIECE, each_bit, near, piece, same, shifted},
+    work::{self, Loop},
 };
 
 const _: () = assert!(TILE == PIECE, "a row of a tile is one piece");
@@ -91,6 +92,7 @@ impl TileUnion {
     ) -> u8 {
         let (rows, runs) = self.join_runs::<CODED>(picture, stride, tile, settings, covered, labels);
         // What stands for a surface comes first in it.
+        work::count(Loop::SurfaceStarts, runs);
         for run in 0..runs {
             let run = run % AREA;
             let root = self.parent[usize::from(self.parent[run]) % AREA];
@@ -108,6 +110,7 @@ impl TileUnion {
         for (y, links) in rows.iter().enumerate().take(tile.height) {
             let Some(labels) = labels.get_mut(tile.row(y, stride)) else { break };
             let mut numbers = [0u8; TILE];
+            work::count(Loop::SurfaceNumbers, links.starts().count_ones() as usize);
             for bit in each_bit(links.starts()) {
                 let root = usize::from(self.parent[run % AREA]) % AREA;
                 run = run.wrapping_add(1);
@@ -169,12 +172,15 @@ impl TileUnion {
                 codes_above = codes;
             }
             let starts = links.starts();
+            work::count(Loop::SurfaceRows, 1);
+            work::count(Loop::SurfaceStarts, starts.count_ones() as usize);
             for (run, bit) in (runs..AREA).zip(each_bit(starts)) {
                 self.parent[run] = run as u16;
                 self.pixels[run] = length(links.left, bit.trailing_zeros() as usize) as u16;
             }
             // Where both runs go on, so does what is known of them.
             for bit in each_bit(up & !(up << 1 & links.left & links_above.left)) {
+                work::count(Loop::SurfaceJoins, 1);
                 let upto = bit | (bit - 1);
                 let begun = |starts: u32| (starts & upto).count_ones() as usize;
                 let (run, run_above) =
@@ -202,6 +208,7 @@ impl TileUnion {
             if parent == place {
                 return place;
             }
+            work::count(Loop::SurfaceHops, 1);
             let above = self.parent[parent % AREA];
             self.parent[here] = above;
             place = usize::from(above);

@@ -12,6 +12,7 @@ use crate::{
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
     links::{Links, PIECE, VALUES, each_bit, near, piece},
+    work::{self, Loop},
 };
 
 /// Largest value of [`ValidateSettings::min_surface_px`]: the room for walking over one small surface.
@@ -24,8 +25,8 @@ pub const MAX_SURFACE_PX: usize = 1024;
 /// surface ends and is too small, it is walked over once more and taken out.
 ///
 /// # Bound
-/// One pass over `width x height` pixels, one over the runs, as many as pixels at most, and at most one more over the pixels of
-/// small surfaces.
+/// One pass over `width x height` pixels, three over the runs, as many as pixels at most, and at most one more over the pixels of
+/// small surfaces. Two surfaces of a row never lie crosswise, so what a run looks up is one step away at most.
 pub struct SurfaceSize<const WIDTH: usize> {
     settings: ValidateSettings,
     width: usize,
@@ -165,6 +166,8 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
             let up = links.value & links_above.value & near(&pixels, &pixels_above, step);
             // Where both runs go on, so does what is known of them.
             let joins = up & !((up << 1 | up_before) & links.left & links_above.left);
+            work::count(Loop::ValidatePieces, 1);
+            work::count(Loop::ValidateEvents, (starts | joins).count_ones() as usize);
             for bit in each_bit(starts | joins) {
                 if starts & bit != 0 {
                     let went_by = values.wrapping_add((links.value & (bit - 1)).count_ones());
@@ -202,8 +205,18 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
             let table = table.as_flattened_mut();
             let renumbered = renumbered.as_flattened_mut();
             renumbered.get_mut(..used).unwrap_or_default().fill(NONE);
+            work::count(Loop::ValidatePlaces, used);
+            work::count(Loop::ValidateRuns, runs);
+            // Older entries come first and stand for the others: from the first on, the way to what stands for one is a single step.
+            for place in 0..used {
+                let Some(parent) = table.get(place).map(|entry| usize::from(entry.parent)) else { break };
+                let Some(parent) = table.get(parent).map(|entry| entry.parent) else { break };
+                if let Some(entry) = table.get_mut(place) {
+                    entry.parent = parent;
+                }
+            }
             for (&here, above) in here.iter().zip(above.iter_mut()).take(runs) {
-                let root = usize::from(root(table, here));
+                let root = table.get(usize::from(here)).map_or(0, |entry| usize::from(entry.parent));
                 let (Some(number), Some(surface)) = (renumbered.get_mut(root), table.get(root)) else { continue };
                 if *number == NONE
                     && let Some(next) = next.get_mut(open)
@@ -252,6 +265,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         };
         visit(walk, usize::from(surface.seed.0), usize::from(surface.seed.1), None);
         while let Some(Step { x, y, steps }) = walk.pop() {
+            work::count(Loop::ValidateTaken, 1);
             let (x, y) = (usize::from(x), usize::from(y));
             visit(walk, x + 1, y, Some(steps));
             visit(walk, x, y + 1, Some(steps));
@@ -346,6 +360,7 @@ fn root(table: &mut [Open], mut label: u16) -> u16 {
         if let Some(entry) = table.get_mut(usize::from(label)) {
             entry.parent = grandparent;
         }
+        work::count(Loop::ValidateHops, 1);
         label = grandparent;
     }
 }

@@ -6,6 +6,7 @@ use crate::error::{ConfigError, ConfigProblem};
 use crate::ground::GroundPlane;
 use crate::health::{Health, HealthLevel};
 use crate::map::{Cell, MapGeometry, SectorDistances};
+use crate::work::{self, Loop};
 
 use super::address::{Address, Message};
 use super::config::{FrameFormat, WireConfig};
@@ -133,6 +134,7 @@ impl Counters {
     /// The next frame of `message`, whose signals `emit` writes.
     pub(super) fn frame(&mut self, message: Message, emit: impl FnOnce(&mut [u8])) -> Frame {
         let id = self.address.id(message);
+        work::count(Loop::WireFrames, 1);
         let mut data = [0; MAX_DATA];
         if let Some(data) = data.get_mut(..message.data_len()) {
             emit(data);

@@ -3,6 +3,7 @@
 use heapless::VecView;
 
 use crate::map::{Cell, CellState, MapGeometry};
+use crate::work::{self, Loop};
 
 use super::message::{CELL_INDEX_MAX, CELL_INDEX_MIN, HeaderRepr, MAX_RUN_LENGTH, Run};
 
@@ -34,6 +35,7 @@ pub(super) fn select(geometry: &MapGeometry, cells: &[Cell], limit: usize, runs:
     for (row, a) in cells.chunks(columns).zip(0..rows) {
         let i = index(geometry.x_first, a);
         let mut open: Option<Run> = None;
+        work::count(Loop::WireCells, row.len());
         for (b, cell) in row.iter().enumerate() {
             let obstacle = match cell.state {
                 CellState::Unknown(_) => None,
@@ -82,8 +84,9 @@ fn insert(heap: &mut VecView<Run, u16>, limit: usize, run: Run) -> u32 {
         if heap.push(run).is_err() {
             return u32::from(run.length);
         }
-        let last = heap.len().saturating_sub(1);
-        sift_up(heap, last);
+        if heap.len() >= limit {
+            heapify(heap);
+        }
         return 0;
     }
     match heap.first_mut() {
@@ -98,6 +101,8 @@ fn insert(heap: &mut VecView<Run, u16>, limit: usize, run: Run) -> u32 {
 
 /// Turns the heap into a list with rising ranks: the end of a heap sort.
 fn sort(heap: &mut [Run]) {
+    // It is none yet if there was room for all.
+    heapify(heap);
     for len in (1..heap.len()).rev() {
         exchange(heap, 0, len);
         if let Some(rest) = heap.get_mut(..len) {
@@ -106,14 +111,10 @@ fn sort(heap: &mut [Run]) {
     }
 }
 
-fn sift_up(heap: &mut [Run], mut child: usize) {
-    while child > 0 {
-        let parent = (child - 1) / 2;
-        if !is_higher(heap, child, parent) {
-            return;
-        }
-        exchange(heap, child, parent);
-        child = parent;
+/// Makes a heap of runs in any order, in as many exchanges as there are runs at most (Floyd, *Algorithm 245*, CACM 7(12), 1964).
+fn heapify(heap: &mut [Run]) {
+    for parent in (0..heap.len() / 2).rev() {
+        sift_down(heap, parent);
     }
 }
 
@@ -136,6 +137,7 @@ fn is_higher(heap: &[Run], a: usize, b: usize) -> bool {
 }
 
 fn exchange(heap: &mut [Run], a: usize, b: usize) {
+    work::count(Loop::WireSifts, 1);
     if a < heap.len() && b < heap.len() {
         heap.swap(a, b);
     }
