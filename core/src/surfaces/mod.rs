@@ -350,6 +350,7 @@ impl Part<'_> {
 
     /// Measures the surfaces of one tile and appends them to the table, with the classes `given` for them, if any.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "what a tile has, input and output")]
     fn measure<const DISPARITIES: usize>(
         &mut self,
         pixels: &[DisparityPixel],
