@@ -144,7 +144,7 @@ impl<const WIDTH: usize> RowLooks<WIDTH> {
 
     #[inline(always)]
     fn take(&mut self, y: usize, rows: [&[u8]; 2], spans: [ValidSpan; 2]) {
-        work::count(Loop::HealthRows, rows.iter().map(|row| row.len()).sum());
+        rows.iter().for_each(|row| work::count(Loop::HealthRows, row.len()));
         for (side, (row, span)) in rows.into_iter().zip(spans).enumerate() {
             if let (Some(tiles), Some(profile)) = (self.tiles.get_mut(side), self.profiles.get_mut(side)) {
                 tiles.push(y, row, span);
@@ -209,7 +209,7 @@ impl<const WIDTH: usize> RowLooks<WIDTH> {
 
 /// Row of the picture in the middle of a strip.
 const fn strip_row(height: usize, strip: usize) -> usize {
-    height * (strip + 1) / (STRIPS + 1)
+    height.saturating_mul(strip.saturating_add(1)) / (STRIPS + 1)
 }
 
 /// Bands of the pictures must be cut between multiples of so many rows: blocks and the rows of a profile are seen as a whole.

@@ -258,13 +258,13 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
         if window == Window::Narrow {
             self.right.begin();
         }
-        let mut begun = 0;
+        let mut begun = 0usize;
         let mut run = first..if window == Window::Narrow { end } else { first };
         loop {
             if run.is_empty() && window == Window::Wide {
-                let most_gap = if begun < SHORT_GAPS { radius / 3 } else { 2 * radius };
+                let most_gap = if begun < SHORT_GAPS { radius / 3 } else { radius.saturating_mul(2) };
                 run = self.weak_run(run.end..end, most_gap);
-                begun += 1;
+                begun = begun.saturating_add(1);
             }
             if run.is_empty() {
                 break;

@@ -38,7 +38,7 @@ impl<const SURFACES: usize> Regions<SURFACES> {
         takes_part: impl Fn(&Surface) -> bool,
     ) {
         work::count(Loop::RegionPlaces, SURFACES);
-        for (place, (parent, next)) in self.parent.iter_mut().zip(&mut self.next).enumerate() {
+        for (place, (parent, next)) in (0..SURFACES).zip(self.parent.iter_mut().zip(&mut self.next)) {
             (*parent, *next) = (place as u16, place as u16);
         }
         let (width, height) = (picture.width(), picture.height());
@@ -129,7 +129,7 @@ impl<const SURFACES: usize> Regions<SURFACES> {
                 *parent = *first;
             }
         }
-        for (place, next) in self.next.iter_mut().enumerate().take(self.len) {
+        for (place, next) in (0..self.len).zip(&mut self.next) {
             *next = place as u16;
         }
         // A root is the first of its region, so everything can be hung in right behind it, from the end on.

@@ -229,7 +229,7 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
     fn whole(&mut self) -> (Part<'_>, Growing<'_, SURFACES>) {
         let Self { settings, limits, width, height, labels, work, tiles, table, .. } = self;
         let (settings, limits) = (&*settings, &*limits);
-        let labels = labels.get_mut(..*width * *height).unwrap_or_default();
+        let labels = labels.get_mut(..width.saturating_mul(*height)).unwrap_or_default();
         let TileWork { union, moments, shifts } = work;
         let part = Part { settings, limits, width: *width, height: *height, top: 0, labels, union, moments, shifts };
         (part, Growing { tiles, table })
