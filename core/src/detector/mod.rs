@@ -1,6 +1,8 @@
 //! The whole detector: one call from a pair of pictures to obstacle cells.
 
 mod detection;
+#[cfg(feature = "interpret")]
+mod interpret;
 mod interpreter;
 mod memory;
 mod stage;
