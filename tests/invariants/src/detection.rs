@@ -144,7 +144,11 @@ fn check_cells(detector: &Small, found: &Found, camera: &Camera, picture: Dispar
             }
             CellState::Free => {
                 assert!(found.ground.is_some(), "free without ground");
-                assert!(cell.pixels >= settings.map.free_min_pixels, "{cell:?}");
+                let least = match settings.detector {
+                    DetectorKind::CostMap => settings.cost_map.min_points,
+                    _ => settings.map.free_min_pixels,
+                };
+                assert!(cell.pixels >= least, "{cell:?}, {camera:?}");
             }
             CellState::Obstacle => {}
         }
