@@ -195,7 +195,8 @@ impl GroundDeviation {
         let level = normal[2] >= libm::cosf(self.ground.max_tilt_deg.to_radians());
         let off = (camera_height_m - frame.camera_height_m()).abs();
         let height = if self.height_known { off <= self.ground.height_tolerance_m } else { camera_height_m > 0.05 };
-        (level && height).then_some((normal, camera_height_m))
+        // A tolerance that is larger than the height lets in what lies above a camera.
+        (level && height && camera_height_m > 0.0).then_some((normal, camera_height_m))
     }
 
     /// Pixels with a disparity, evenly spread: column and row from the centre, and the disparity in 1/16 px.
