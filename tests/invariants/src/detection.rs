@@ -102,6 +102,7 @@ fn check_ground(found: &Found, camera: &Camera, picture: DisparityPicture<'_>) {
     assert!(numbers.iter().all(|number| number.is_finite()) && ground.rms_m >= 0.0, "{ground:?}");
     let Mount { forward_m, left_m, height_m, .. } = camera.mount;
     let at = [forward_m, left_m, height_m.unwrap_or(Mount::ASSUMED_HEIGHT_M)].map(f64::from);
+    assert!(ground.camera_height_m > 0.0, "ground above the camera: {ground:?}");
     let height = (0..3).map(|i| normal[i] * at[i]).sum::<f64>() - f64::from(ground.offset_m);
     let told = f64::from(ground.camera_height_m);
     assert!((height - told).abs() < 1.0e-4 * (10.0 + told.abs()), "the camera is {height} m above {ground:?}");

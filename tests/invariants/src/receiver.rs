@@ -8,7 +8,8 @@ use fencepost_core::{
     wire::{
         Address, CELL_INDEX_MAX, CELL_INDEX_MIN, Frame, FrameFormat, Message, NoScan, NodeState, PROTOCOL_VERSION,
         PacketError, ReceiveError, Received, ReceiverConfig, ReceiverStatistics, Scan, ScanEncoder, ScanReceiver,
-        Status, WireConfig, WireSettings, max_frames_per_scan, protect,
+        Status, WireConfig, WireSettings, check_geometry, max_bits_per_second, max_frames_per_scan, max_load_permille,
+        protect,
     },
 };
 
@@ -31,6 +32,9 @@ pub(crate) fn run(bytes: &[u8]) {
         format: if source.flag() { FrameFormat::Fd } else { FrameFormat::Classic },
         max_cell_frames: 1 + source.byte() % 3,
     };
+    if source.byte() == 255 {
+        check_settings(&mut source);
+    }
     let config = WireConfig::new(settings).expect("good settings");
     let mut bus = Bus::new(config);
     while !source.is_empty() {
@@ -147,9 +151,9 @@ impl Bus {
     fn send(&mut self, source: &mut Source<'_>) {
         let geometry = MapGeometry {
             cell_size_mm: 500,
-            x_first: source.one_of(&[0, -3, -64, 60]),
+            x_first: source.one_of(&[0, -3, -64, 60, -66, 64]),
             x_count: 1 + source.below(4) as u16,
-            y_first: source.one_of(&[0, -4, -64, 58]),
+            y_first: source.one_of(&[0, -4, -64, 58, -70, 32_760]),
             y_count: 1 + source.below(8) as u16,
         };
         let cells: Vec<Cell> = (0..geometry.len())
@@ -185,7 +189,8 @@ impl Bus {
         for (index, cell) in cells.iter().enumerate() {
             let (i, j) = geometry.cell_at(index);
             let indices = i8::try_from(i).ok().zip(i8::try_from(j).ok());
-            let Some((i, j)) = indices.filter(|(i, j)| *i <= CELL_INDEX_MAX && *j <= CELL_INDEX_MAX) else { continue };
+            let range = CELL_INDEX_MIN..=CELL_INDEX_MAX;
+            let Some((i, j)) = indices.filter(|(i, j)| range.contains(i) && range.contains(j)) else { continue };
             match cell.state {
                 CellState::Unknown(_) => {}
                 state => all.push((i, j, state == CellState::Obstacle)),
@@ -257,6 +262,57 @@ impl Bus {
         assert!(kept, "a cell that was not sent: {cells:?}, {:?}", sent.known);
         assert!(cells.len() + usize::from(scan.dropped_cells) >= sent.known.len(), "cells lost without a word");
         assert_eq!(scan.sectors.distance_dm, sent.sectors);
+    }
+}
+
+/// Settings of any values, and frames of any length: taken by the rules in words, or refused.
+fn check_settings(source: &mut Source<'_>) {
+    let settings = WireSettings {
+        base_id: source.word(),
+        node: source.byte(),
+        format: if source.flag() { FrameFormat::Fd } else { FrameFormat::Classic },
+        max_cell_frames: source.byte(),
+    };
+    let WireSettings { base_id, node, max_cell_frames, .. } = settings;
+    let good = (1..=7).any(|k| k * 0x100 == base_id) && node < 16 && max_cell_frames > 0;
+    let config = WireConfig::new(settings);
+    assert_eq!(config.is_ok(), good, "{settings:?}");
+    if let Ok(config) = config {
+        let runs = usize::from(max_cell_frames) * if settings.format == FrameFormat::Fd { 8 } else { 2 };
+        assert_eq!(config.max_runs(), runs);
+        assert_eq!(Encoder::new(config).is_ok(), runs <= RUNS, "{settings:?}");
+        let rate = source.word();
+        let bits = max_bits_per_second(&config, rate);
+        assert!(bits >= max_bits_per_second(&config, rate.saturating_sub(1)), "fewer bits with more scans");
+        let permille = max_load_permille(&config, source.double_word(), rate);
+        assert!(permille > 0 && max_load_permille(&config, u32::MAX, rate) <= permille.max(1));
+    }
+    let geometry = MapGeometry {
+        cell_size_mm: source.word(),
+        x_first: source.word() as i16,
+        x_count: source.word() % 300,
+        y_first: i16::from(source.byte() as i8),
+        y_count: u16::from(source.byte()),
+    };
+    let fits = |first: i16, count: u16| (-64..=63).contains(&first) && i32::from(first) + i32::from(count) <= 64;
+    let MapGeometry { cell_size_mm, x_first, x_count, y_first, y_count } = geometry;
+    let good = (1..=4095).contains(&cell_size_mm)
+        && fits(x_first, x_count)
+        && fits(y_first, y_count)
+        && u32::from(x_count) * u32::from(y_count) <= 16_383;
+    assert_eq!(check_geometry(&geometry).is_ok(), good, "{geometry:?}");
+    let raw = source.word() & 0x7FF;
+    let id = StandardId::new(raw).unwrap_or(StandardId::MAX);
+    let data = [source.byte(); 70];
+    let data = &data[..source.below(70)];
+    let classic = <Frame as embedded_can::Frame>::new(id, data);
+    assert_eq!(classic.is_some(), data.len() <= 8);
+    assert_eq!(Frame::fd(id, data).is_some(), matches!(data.len(), 0..=8 | 12 | 16 | 20 | 24));
+    for (frame, mark) in [(classic, "#"), (Frame::fd(id, data), "##1")] {
+        let Some(frame) = frame else { continue };
+        let hex: String = data.iter().map(|byte| format!("{byte:02X}")).collect();
+        assert_eq!(format!("{frame:?}"), format!("{raw:03X}{mark}{hex}"));
+        assert_eq!((embedded_can::Frame::data(&frame), embedded_can::Frame::dlc(&frame)), (data, data.len()));
     }
 }
 
