@@ -3,7 +3,7 @@
 use fencepost_core::{
     arch::Backend,
     detector::Detector,
-    disparity::DisparityPixel,
+    disparity::{DisparityPixel, Reason},
     geometry::{Mount, RectifiedPair},
     ground::GroundSettings,
     health::HealthSettings,
@@ -15,7 +15,7 @@ use fencepost_core::{
     },
     obstacles::ObstacleSettings,
     settings::Settings,
-    surfaces::SurfaceSettings,
+    surfaces::{SurfaceSettings, TILE},
     validate::ValidateSettings,
 };
 
@@ -236,7 +236,7 @@ fn map(source: &mut Source<'_>) -> MapSettings {
     }
 }
 
-/// A disparity picture, stroke by stroke: planes, the ground, noise, reasons, and any bits at all.
+/// A disparity picture, stroke by stroke: planes, the ground, noise, reasons, cuts along tiles, and any bits at all.
 pub(crate) fn draw(source: &mut Source<'_>, camera: &Camera, pixels: &mut Vec<DisparityPixel>) {
     let (width, height) = (camera.pair.width as usize, camera.pair.height as usize);
     let eye = Eye::new(&camera.pair, &camera.mount);
@@ -247,6 +247,10 @@ pub(crate) fn draw(source: &mut Source<'_>, camera: &Camera, pixels: &mut Vec<Di
         if kind == 7 {
             let place = usize::from(source.word()) % pixels.len();
             pixels[place] = DisparityPixel::from_bits(source.word());
+            continue;
+        }
+        if kind == 6 {
+            cut(source, (width, height), pixels);
             continue;
         }
         let (left, top) = (source.below(width), source.below(height));
@@ -270,6 +274,20 @@ pub(crate) fn draw(source: &mut Source<'_>, camera: &Camera, pixels: &mut Vec<Di
                 pixels[y * width + x] = DisparityPixel::from_bits(bits as u16);
             }
         }
+    }
+}
+
+/// Cuts the picture at the border of a tile but for one pixel, mostly at an end of the cut: what lies on both sides hangs together
+/// only there.
+fn cut(source: &mut Source<'_>, (width, height): (usize, usize), pixels: &mut [DisparityPixel]) {
+    let along_row = source.flag();
+    let (length, across) = if along_row { (width, height) } else { (height, width) };
+    let at = (TILE - 1 + source.below(2)).min(across - 1);
+    let any = source.below(length);
+    let open = source.one_of(&[length - 1, 0, TILE - 1, TILE, any]);
+    for place in (0..length).filter(|place| *place != open) {
+        let (x, y) = if along_row { (place, at) } else { (at, place) };
+        pixels[y * width + x] = DisparityPixel::none(Reason::LowTexture);
     }
 }
 

@@ -107,6 +107,7 @@ pub(crate) fn run(bytes: &[u8]) {
         orders.push([source.byte(), source.byte()]);
     }
     let calls = orders.len() as u64;
+    let bus_fails = orders.iter().any(|[order, _]| (13..=20).contains(&(order % 24)));
 
     let bus = VirtualBus::new(8000);
     let mut listener = bus.attach();
@@ -137,11 +138,17 @@ pub(crate) fn run(bytes: &[u8]) {
     assert!(report.bus.scans <= front.frames + 1, "{report:?}");
     assert_eq!(listener.dropped(), 0, "the listener is slow");
     let frames = std::iter::from_fn(|| listener.receive().ok().flatten());
-    check_bus(frames.map(|(_, frame)| frame), wire.address(), report.bus.sent.frames);
+    let (heard, last_state) = check_bus(frames.map(|(_, frame)| frame), wire.address());
+    // A controller that goes off the bus loses what it had taken.
+    let taken = report.bus.sent.frames;
+    assert!(heard == taken || (bus_fails && heard < taken), "{heard} of {taken} frames that the bus took");
+    let starting = last_state == Some(NodeState::Starting);
+    assert!(bus_fails || report.bus.scans == 0 || !starting, "the last word of a node that ran");
 }
 
 /// Every frame is a good one; a scan is whole or not there; nothing is free in pictures that are not to be trusted.
-fn check_bus(frames: impl Iterator<Item = CanFrame>, address: Address, sent: u64) {
+/// Returns how many there were, and what the node said of itself at last.
+fn check_bus(frames: impl Iterator<Item = CanFrame>, address: Address) -> (u64, Option<NodeState>) {
     let config =
         ReceiverConfig { heartbeat_timeout_ns: u64::MAX, max_age_ns: u64::MAX, ..ReceiverConfig::new(address) };
     let mut receiver = ScanReceiver::<2048>::new(config);
@@ -169,6 +176,5 @@ fn check_bus(frames: impl Iterator<Item = CanFrame>, address: Address, sent: u64
             assert!(scan.runs.iter().all(|run| run.obstacle), "free in a scan that is {:?}", scan.health);
         }
     }
-    assert_eq!(count, sent, "frames that the bus took");
-    assert_ne!(last_state, Some(NodeState::Starting), "the last word of a node that ran");
+    (count, last_state)
 }

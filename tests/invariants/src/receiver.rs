@@ -19,8 +19,10 @@ use crate::{
 };
 
 const RUNS: usize = 24;
+/// The receiver has room for fewer runs than may be sent.
+const ROOM: usize = 12;
 type Encoder = ScanEncoder<RUNS>;
-type Receiver = ScanReceiver<RUNS>;
+type Receiver = ScanReceiver<ROOM>;
 /// Frames of the longest scan that is sent here.
 type Frames = heapless::Vec<Frame, 32>;
 
@@ -149,12 +151,14 @@ impl Bus {
 
     /// Sends a scan; its frames wait.
     fn send(&mut self, source: &mut Source<'_>) {
+        let few = 1 + source.below(8) as u16;
         let geometry = MapGeometry {
             cell_size_mm: 500,
             x_first: source.one_of(&[0, -3, -64, 60, -66, 64]),
             x_count: 1 + source.below(4) as u16,
             y_first: source.one_of(&[0, -4, -64, 58, -70, 32_760]),
-            y_count: 1 + source.below(8) as u16,
+            // More than a run has, too.
+            y_count: source.one_of(&[few, few, few, 40]),
         };
         let cells: Vec<Cell> = (0..geometry.len())
             .map(|_| {
@@ -171,7 +175,7 @@ impl Bus {
         let ground = (source.flag()).then(|| ground_plane(source));
         let scan = Scan {
             scan_index: self.next_scan,
-            age_ns: u64::from(source.byte()),
+            age_ns: u64::from(source.byte()) << source.one_of(&[0, 0, 0, 24]),
             health: Health { level: HealthLevel::Ok, reasons: 0 },
             geometry: &geometry,
             cells: &cells,
@@ -245,7 +249,7 @@ impl Bus {
         let heartbeat = self.receiver.heartbeat(now_ns).expect("no scan without a heartbeat");
         assert_eq!((heartbeat.state, heartbeat.protocol_version), (NodeState::Running, PROTOCOL_VERSION));
         assert!(scan.age_ns <= config.max_age_ns, "too old");
-        assert!(self.receiver.statistics().scans > 0 && scan.runs.len() <= RUNS && scan.cell_size_mm > 0);
+        assert!(self.receiver.statistics().scans > 0 && scan.runs.len() <= ROOM && scan.cell_size_mm > 0);
         for run in scan.runs {
             assert!(run.length >= 1 && run.i >= CELL_INDEX_MIN && run.j >= CELL_INDEX_MIN);
             assert!(i16::from(run.j) + i16::from(run.length) - 1 <= i16::from(CELL_INDEX_MAX), "{run:?}");

@@ -98,7 +98,7 @@ impl File {
 
 /// Rows of a grey picture with so many bytes to a pixel, each with the filter that it begins with.
 fn rows(bytes: u32) -> Vec<u8> {
-    let row = (0..1 + SIZE.0 * bytes).map(|x| if x == 0 { 0 } else { x as u8 * 7 });
+    let row = (0..1 + SIZE.0 * bytes).map(|x| if x == 0 { 0 } else { (x * 7) as u8 });
     (0..SIZE.1).flat_map(|_| row.clone()).collect()
 }
 
