@@ -249,6 +249,10 @@ pub(crate) fn draw(source: &mut Source<'_>, camera: &Camera, pixels: &mut Vec<Di
             pixels[place] = DisparityPixel::from_bits(source.word());
             continue;
         }
+        if kind == 5 {
+            ledge(source, (width, height), camera.settings.surfaces.step_sixteenths, pixels);
+            continue;
+        }
         if kind == 6 {
             cut(source, (width, height), pixels);
             continue;
@@ -274,6 +278,17 @@ pub(crate) fn draw(source: &mut Source<'_>, camera: &Camera, pixels: &mut Vec<Di
                 pixels[y * width + x] = DisparityPixel::from_bits(bits as u16);
             }
         }
+    }
+}
+
+/// Fills the picture with two disparities that meet at the border of a tile and differ by about as much as a surface may bridge.
+fn ledge(source: &mut Source<'_>, (width, height): (usize, usize), step: u16, pixels: &mut [DisparityPixel]) {
+    let along_row = source.flag();
+    let near = 1 + u16::from(source.byte()) / 2;
+    let far = near.saturating_add(step).saturating_add(source.below(4) as u16).saturating_sub(1);
+    for (place, pixel) in pixels.iter_mut().enumerate().take(width * height) {
+        let beyond = if along_row { place / width } else { place % width } >= TILE;
+        *pixel = DisparityPixel::from_steps(if beyond { far } else { near });
     }
 }
 
