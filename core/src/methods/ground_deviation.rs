@@ -145,9 +145,11 @@ impl GroundDeviation {
         }
         let (samples, squares) = found?;
         let (normal, camera_height_m) = self.plausible(&plane)?;
-        let support = u32::try_from(samples).unwrap_or(u32::MAX).saturating_mul((self.stride * self.stride) as u32);
-        let pixels = (pair.width as usize * pair.height as usize) as f32;
-        if (support as f32) < self.ground.min_support_permille * 1.0e-3 * pixels {
+        // Samples at the edge of the picture stand for fewer pixels than others.
+        let pixels = pair.width.saturating_mul(pair.height);
+        let each = (self.stride * self.stride) as u32;
+        let support = u32::try_from(samples).unwrap_or(u32::MAX).saturating_mul(each).min(pixels);
+        if (support as f32) < self.ground.min_support_permille * 1.0e-3 * pixels as f32 {
             return None;
         }
         let origin = frame.origin_m();
