@@ -276,6 +276,19 @@ fn files_that_are_not_there_or_not_text_are_said() {
     assert!(Calibration::load(&none, None).is_err());
 }
 
+/// A rig's file or a link in a recording can name anything.
+#[test]
+#[cfg(unix)]
+fn a_calibration_without_an_end_is_refused() {
+    let error = Calibration::load(&["/dev/zero"], None).unwrap_err();
+    assert_eq!(error.problem, CalibrationProblem::NotText);
+    let long = std::env::temp_dir().join(format!("fencepost-long-{}.yaml", std::process::id()));
+    std::fs::write(&long, vec![b' '; (1 << 20) + 1]).unwrap();
+    let error = Calibration::load(&[&long], None).unwrap_err();
+    std::fs::remove_file(long).unwrap();
+    assert_eq!(error.problem, CalibrationProblem::NotText);
+}
+
 #[test]
 fn more_than_eight_coefficients_pass_only_as_zeros() {
     let intrinsics = text("intrinsics.yml");

@@ -2,6 +2,8 @@
 
 mod bands;
 mod detection;
+#[cfg(feature = "interpret")]
+mod interpret;
 mod interpreter;
 mod memory;
 mod stage;

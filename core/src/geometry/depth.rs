@@ -28,7 +28,7 @@ impl<const DISPARITIES: usize> DepthTable<DISPARITIES> {
     }
 
     /// Fills the table for `disparities` disparities from `min_disparity` on. Disparities whose rays do not meet in front of
-    /// the camera have no distance.
+    /// the camera have no distance, and neither has 0: it stands for pixels without a disparity.
     ///
     /// # Bound
     /// `16 x DISPARITIES` steps.
@@ -38,8 +38,10 @@ impl<const DISPARITIES: usize> DepthTable<DISPARITIES> {
         let offset_steps = pair.disparity_offset_px * 16.0;
         let used = usize::from(disparities) * 16;
         for (i, entry) in self.inverse.as_flattened_mut().iter_mut().enumerate() {
-            let steps = f32::from(self.base_steps) + i as f32 + offset_steps;
-            *entry = if i < used && steps >= 1.0 { libm::roundf(INVERSE_ONE / steps) as u32 } else { 0 };
+            let disparity = f32::from(self.base_steps) + i as f32;
+            let steps = disparity + offset_steps;
+            *entry =
+                if i < used && disparity > 0.0 && steps >= 1.0 { libm::roundf(INVERSE_ONE / steps) as u32 } else { 0 };
         }
         let place = |i: usize| self.base_steps.saturating_add(u16::try_from(i).unwrap_or(u16::MAX));
         let entries = self.inverse.as_flattened();

@@ -147,12 +147,14 @@ fn distances_are_those_of_the_formula_for_every_step() {
             disparity_offset_px: if round % 2 == 0 { 0.0 } else { random.within(-40.0, 40.0) as f32 },
             ..test_world::PAIR
         };
-        let (min_disparity, disparities) = (random.below(100) as u16, 8 + random.below(121) as u16);
+        let first = if round % 4 == 1 { 0 } else { random.below(100) as u16 };
+        let (min_disparity, disparities) = (first, 8 + random.below(121) as u16);
         table.configure(&pair, min_disparity, disparities);
         let scale = f64::from(pair.focal_px) * f64::from(pair.baseline_m);
         for steps in 0..=u16::MAX {
             let disparity = f64::from(steps) / 16.0 + f64::from(pair.disparity_offset_px);
-            let in_range = steps >= min_disparity * 16 && steps < (min_disparity + disparities) * 16;
+            // A disparity of 0 is none, also where an offset would give it a distance.
+            let in_range = steps > 0 && steps >= min_disparity * 16 && steps < (min_disparity + disparities) * 16;
             let found = f64::from(table.distance_m(steps));
             // At the very end of what meets the rounding of the offset decides.
             if (disparity - 1.0 / 16.0).abs() < 1.0e-4 {

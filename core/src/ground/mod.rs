@@ -341,7 +341,8 @@ impl GroundFinder {
         let expected = self.frame.map_or(0.0, |frame| frame.camera_height_m());
         let off = (plane.camera_height_m - expected).abs();
         let height = match height {
-            Height::OfMount => off <= self.settings.height_tolerance_m,
+            // A tolerance that is larger than the height lets in what lies above a camera.
+            Height::OfMount => off <= self.settings.height_tolerance_m && plane.camera_height_m > 0.0,
             Height::Unknown => plane.camera_height_m > LEAST_HEIGHT_M,
             Height::NotOfMount => {
                 plane.camera_height_m > LEAST_HEIGHT_M.max(LEAST_SHARE * expected)

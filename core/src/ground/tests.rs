@@ -128,6 +128,8 @@ fn without_ground_there_is_no_plane() {
         ceiling.patches.push(ground(2.6));
         let mount = Mount { pitch_down_deg: -15.0, ..mount };
         assert_eq!(find(&ceiling, &mount, &settings), None, "a ceiling");
+        let tolerant = GroundSettings { height_tolerance_m: 5.0, ..settings };
+        assert_eq!(find(&ceiling, &mount, &tolerant), None, "a ceiling within the tolerance");
     }
 }
 

@@ -108,6 +108,15 @@ impl<const CELLS: usize> Merged<CELLS> {
         self.levels = Some(Levels { best: best.min(health.level), worst: worst.max(health.level) });
     }
 
+    /// Makes all free cells unknown, for a reason that lies with none of the pairs: what they say together comes late, say, or some
+    /// of it was lost. Obstacles stay.
+    ///
+    /// # Bound
+    /// One pass over the cells.
+    pub fn withhold_free(&mut self) {
+        self.map.withhold_free();
+    }
+
     /// The cells; none before the first pair.
     pub const fn map(&self) -> &ObstacleMap<CELLS> {
         &self.map

@@ -147,10 +147,11 @@ impl GroundDeviation {
         }
         let (samples, squares) = found?;
         let (normal, camera_height_m) = self.plausible(&plane)?;
-        let support =
-            u32::try_from(samples).unwrap_or(u32::MAX).saturating_mul(self.stride.saturating_mul(self.stride) as u32);
-        let pixels = (pair.width as usize).saturating_mul(pair.height as usize) as f32;
-        if (support as f32) < self.ground.min_support_permille * 1.0e-3 * pixels {
+        // Samples at the edge of the picture stand for fewer pixels than others.
+        let pixels = pair.width.saturating_mul(pair.height);
+        let each = self.stride.saturating_mul(self.stride) as u32;
+        let support = u32::try_from(samples).unwrap_or(u32::MAX).saturating_mul(each).min(pixels);
+        if (support as f32) < self.ground.min_support_permille * 1.0e-3 * pixels as f32 {
             return None;
         }
         let origin = frame.origin_m();
@@ -201,7 +202,8 @@ impl GroundDeviation {
         let level = normal[2] >= libm::cosf(self.ground.max_tilt_deg.to_radians());
         let off = (camera_height_m - frame.camera_height_m()).abs();
         let height = if self.height_known { off <= self.ground.height_tolerance_m } else { camera_height_m > 0.05 };
-        (level && height).then_some((normal, camera_height_m))
+        // A tolerance that is larger than the height lets in what lies above a camera.
+        (level && height && camera_height_m > 0.0).then_some((normal, camera_height_m))
     }
 
     /// Pixels with a disparity, evenly spread: column and row from the centre, and the disparity in 1/16 px.

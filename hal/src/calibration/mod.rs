@@ -16,7 +16,10 @@ mod opencv;
 mod pair;
 mod ros;
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::Read,
+    path::{Path, PathBuf},
+};
 
 use fencepost_core::geometry::StereoCalibration;
 
@@ -168,11 +171,16 @@ impl std::fmt::Display for CalibrationFormat {
 fn read(file: &Path) -> Result<String, CalibrationError> {
     let error = |problem| CalibrationError::new(file, "", problem);
     let unreadable = |e: std::io::Error| error(CalibrationProblem::Unreadable(e.to_string()));
-    let length = std::fs::metadata(file).map_err(unreadable)?.len();
-    if length > MAX_BYTES {
+    // A device or a pipe has no length, and may have no end.
+    if !std::fs::metadata(file).map_err(unreadable)?.is_file() {
         return Err(error(CalibrationProblem::NotText));
     }
-    String::from_utf8(std::fs::read(file).map_err(unreadable)?).map_err(|_| error(CalibrationProblem::NotText))
+    let mut bytes = Vec::new();
+    std::fs::File::open(file).map_err(unreadable)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(error(CalibrationProblem::NotText));
+    }
+    String::from_utf8(bytes).map_err(|_| error(CalibrationProblem::NotText))
 }
 
 /// KITTI's lines are valid YAML too, so they are looked for first: `P0:` with a number behind it, or a `.txt` file.

@@ -311,15 +311,20 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         if now_ns.saturating_sub(exposure_ns) > self.deadline_ns() {
             self.watch.see(HealthReason::Late, HealthLevel::Degraded, now_ns);
         }
-        let (seen, map, sectors) =
-            (self.merged.health(), self.merged.map(), self.merged.sectors(self.sector_width_deg));
+        let seen = self.merged.health();
+        let health = seen.and(self.watch.health(now_ns));
+        // What goes on being told for a while belongs to this scan as well: a node that is blind calls nothing free.
+        if health.level >= HealthLevel::Blind {
+            self.merged.withhold_free();
+        }
+        let (map, sectors) = (self.merged.map(), self.merged.sectors(self.sector_width_deg));
         // Counts the scans and not the frames: a gap would tell a receiver that it has missed something.
         let scan_index = self.report.scans as u16;
         self.scan_health = seen;
         let scan = Scan {
             scan_index,
             age_ns,
-            health: seen.and(self.watch.health(now_ns)),
+            health,
             geometry: &map.geometry,
             cells: &map.cells,
             sectors: &sectors,

@@ -1,0 +1,407 @@
+//! A pair of cameras on a vehicle, its settings, and disparity pictures for it: all within the capacity of the smallest of detectors.
+
+use fencepost_core::{
+    arch::Backend,
+    detector::Detector,
+    disparity::{DisparityPixel, Reason},
+    geometry::{Mount, RectifiedPair},
+    ground::GroundSettings,
+    health::HealthSettings,
+    map::{MapGeometry, MapSettings},
+    matching::{MatchCost, MatchSettings, Prefilter},
+    methods::{
+        ConfidenceSettings, CostMapSettings, DetectorKind, DisparitySegmentSettings, GroundDeviationSettings,
+        PixelNormalSettings,
+    },
+    obstacles::ObstacleSettings,
+    settings::Settings,
+    surfaces::{SurfaceSettings, TILE},
+    validate::ValidateSettings,
+};
+
+use crate::Source;
+
+/// Largest width, px: more than a tile.
+pub(crate) const WIDTH: usize = 40;
+/// Largest height, px.
+pub(crate) const HEIGHT: usize = 36;
+/// Pixels of the largest picture.
+pub(crate) const PIXELS: usize = WIDTH * HEIGHT;
+/// Disparities.
+pub(crate) const DISPARITIES: usize = 12;
+/// Obstacles.
+pub(crate) const OBSTACLES: usize = 3;
+/// Cells.
+pub(crate) const CELLS: usize = 64;
+/// Surfaces: so few that some are dropped.
+pub(crate) const SURFACES: usize = 8;
+
+/// The detector that is fuzzed.
+pub(crate) type Small = Detector<PIXELS, WIDTH, DISPARITIES, 42, SURFACES, OBSTACLES, CELLS>;
+
+/// Everything that a detector is configured with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Camera {
+    pub(crate) pair: RectifiedPair,
+    pub(crate) mount: Mount,
+    pub(crate) settings: Settings,
+}
+
+impl Camera {
+    /// Of any bytes. Nearly all of them can be used.
+    pub(crate) fn read(source: &mut Source<'_>) -> Self {
+        // Sizes around those of a tile as often as any others.
+        let (any_width, any_height) = (17 + source.below(24), 17 + source.below(20));
+        let width = source.one_of(&[16, 16, 20, 24, 33, 40, any_width]);
+        let height = source.one_of(&[16, 16, 18, 20, 33, 36, any_height]);
+        let focal_px = source.within(12.0, 60.0);
+        let pair = RectifiedPair {
+            width: width as u32,
+            height: height as u32,
+            focal_px,
+            cx: 0.5 * width as f32 + source.within(-8.0, 8.0),
+            cy: 0.5 * height as f32 + source.within(-8.0, 8.0),
+            baseline_m: source.within(0.02, 0.6),
+            disparity_offset_px: source.one_of(&[0.0, 0.0, 0.0, 1.5, -2.25, -4.0]),
+        };
+        let mount = Mount {
+            height_m: (source.below(4) > 0).then_some(source.within(0.1, 2.0)),
+            pitch_down_deg: source.within(-10.0, 60.0),
+            roll_deg: source.one_of(&[0.0, 0.0, 5.0, -20.0]),
+            forward_m: source.one_of(&[0.0, 0.0, 0.75, -1.5]),
+            left_m: source.one_of(&[0.0, 0.0, 0.3, -1.0]),
+            yaw_left_deg: source.one_of(&[0.0, 0.0, 30.0, -90.0, 179.0]),
+        };
+        let mut camera = Self { pair, mount, settings: settings(source) };
+        // Now and then a number that nobody should have written.
+        if source.below(16) == 15 {
+            let value = f32::from_bits(source.double_word());
+            *camera.number(source.byte()) = value;
+        }
+        camera
+    }
+
+    /// One of the numbers of the geometry.
+    fn number(&mut self, which: u8) -> &mut f32 {
+        let Self { pair, mount, settings } = self;
+        match which % 14 {
+            0 => &mut pair.focal_px,
+            1 => &mut pair.cx,
+            2 => &mut pair.cy,
+            3 => &mut pair.baseline_m,
+            4 => &mut pair.disparity_offset_px,
+            5 => mount.height_m.get_or_insert(1.0),
+            6 => &mut mount.pitch_down_deg,
+            7 => &mut mount.roll_deg,
+            8 => &mut mount.forward_m,
+            9 => &mut mount.left_m,
+            10 => &mut mount.yaw_left_deg,
+            11 => &mut settings.map.max_range_m,
+            12 => &mut settings.ground.max_range_m,
+            _ => &mut settings.obstacles.max_range_m,
+        }
+    }
+
+    /// Number of pixels.
+    pub(crate) const fn pixels(&self) -> usize {
+        (self.pair.width * self.pair.height) as usize
+    }
+}
+
+/// Settings of all stages, with limits that small pictures reach.
+fn settings(source: &mut Source<'_>) -> Settings {
+    let detector = source.one_of(&[
+        DetectorKind::SurfaceNormals,
+        DetectorKind::SurfaceNormals,
+        DetectorKind::SurfaceNormals,
+        DetectorKind::CostMap,
+        DetectorKind::GroundDeviation,
+        DetectorKind::DisparitySegments,
+        DetectorKind::PixelNormals,
+    ]);
+    let other = source.one_of(&DetectorKind::ALL);
+    let cross_check = (source.below(4) == 3 && other != detector).then_some(other);
+    Settings {
+        detector,
+        cross_check,
+        matching: matching(source),
+        validate: ValidateSettings {
+            min_surface_px: source.one_of(&[0, 0, 8, 40]),
+            step_sixteenths: source.one_of(&[8, 0, 16, 1024]),
+        },
+        surfaces: SurfaceSettings {
+            step_sixteenths: source.one_of(&[16, 0, 1, 8, 64]),
+            min_pixels: source.one_of(&[16, 16, 24, 100]),
+            horizontal_deg: source.one_of(&[30.0, 10.0, 45.0]),
+            vertical_deg: source.one_of(&[45.0, 60.0, 89.0]),
+        },
+        ground: ground(source),
+        obstacles: obstacles(source),
+        map: map(source),
+        health: HealthSettings {
+            low_coverage_percent: source.one_of(&[8.0, 0.0, 60.0]),
+            blind_coverage_percent: source.one_of(&[1.0, 0.0, 30.0]),
+            exchange_test_percent: source.one_of(&[15.0, 0.0, 100.0]),
+            trigger_frames: 1 + source.below(2) as u8,
+            release_frames: source.one_of(&[5, 1, 2]),
+            ..HealthSettings::default()
+        },
+        cost_map: CostMapSettings {
+            min_points: source.one_of(&[10, 2]),
+            min_columns: source.one_of(&[24, 2]),
+            obstacle_cost: source.one_of(&[20, 2]),
+            ..CostMapSettings::default()
+        },
+        ground_deviation: GroundDeviationSettings {
+            hypotheses: source.one_of(&[8, 0, 2]),
+            samples: source.one_of(&[100, 400]),
+            ..GroundDeviationSettings::default()
+        },
+        disparity_segments: DisparitySegmentSettings::default(),
+        pixel_normals: PixelNormalSettings {
+            window: source.one_of(&[11, 3, 5, 21]),
+            min_filled_percent: source.one_of(&[50, 0, 100]),
+            ..PixelNormalSettings::default()
+        },
+        confidence: ConfidenceSettings {
+            disputed_percent: source.one_of(&[50, 0, 100]),
+            unconfirmed_percent: source.one_of(&[80, 0, 100]),
+        },
+    }
+}
+
+fn matching(source: &mut Source<'_>) -> MatchSettings {
+    MatchSettings {
+        disparities: source.one_of(&[12, 8, 9]),
+        min_disparity: source.one_of(&[0, 0, 1, 3]),
+        cost: source.one_of(&[MatchCost::Census, MatchCost::AbsoluteDifferences]),
+        window_width: source.one_of(&[5, 9, 7]),
+        window_height: source.one_of(&[5, 7]),
+        wide_window_width: source.one_of(&[0, 15, 31]),
+        weak_texture: source.one_of(&[224, 0, 1000]),
+        prefilter: source.one_of(&[Prefilter::HorizontalSobel, Prefilter::Grey]),
+        texture: source.one_of(&[32, 0, 200]),
+        uniqueness_percent: source.one_of(&[6, 0, 20]),
+        back_check: source.below(4) > 0,
+        saturated_percent: source.one_of(&[60, 100, 1]),
+        ..MatchSettings::DEFAULT
+    }
+}
+
+fn ground(source: &mut Source<'_>) -> GroundSettings {
+    GroundSettings {
+        max_tilt_deg: source.one_of(&[20.0, 0.0, 45.0]),
+        height_tolerance_m: source.one_of(&[0.5, 0.0, 5.0]),
+        fit_noise_max_px: source.one_of(&[0.7, 0.0, 4.0]),
+        surface_tolerance_m: source.one_of(&[0.06, 0.3]),
+        terrain_patch_m: source.one_of(&[0.75, 0.1]),
+        min_support_permille: source.one_of(&[2.0, 100.0]),
+        other_height_support_permille: source.one_of(&[20.0, 0.0, 2000.0]),
+        hold_frames: source.one_of(&[0, 1, 10]),
+        ..GroundSettings::default()
+    }
+}
+
+fn obstacles(source: &mut Source<'_>) -> ObstacleSettings {
+    ObstacleSettings {
+        min_height_m: source.one_of(&[0.25, 0.02]),
+        min_pixels: source.one_of(&[40, 0, 16]),
+        min_area_m2: source.one_of(&[0.02, 0.0]),
+        min_size_m: source.one_of(&[0.15, 0.0]),
+        max_range_m: source.one_of(&[40.0, 3.0]),
+        ..ObstacleSettings::default()
+    }
+}
+
+fn map(source: &mut Source<'_>) -> MapSettings {
+    let (x_count, y_count) = source.one_of(&[(8, 8), (16, 4), (4, 16), (1, 1), (64, 1)]);
+    MapSettings {
+        geometry: MapGeometry {
+            cell_size_mm: source.one_of(&[500, 250, 100, 2000]),
+            x_first: source.one_of(&[0, 0, -2, -64]),
+            x_count,
+            y_first: source.one_of(&[-4, -4, -8, 0]),
+            y_count,
+        },
+        obstacle_cover: source.one_of(&[0.1, 0.0, 1.0]),
+        obstacle_min_pixels: source.one_of(&[4, 1, 24]),
+        free_cover: source.one_of(&[0.03, 0.0, 1.0]),
+        free_min_pixels: source.one_of(&[4, 1]),
+        height_noise_px: source.one_of(&[0.8, 0.0]),
+        smear_share: source.one_of(&[0.33, 0.0, 1.0]),
+        smear_cells: source.one_of(&[2, 0, 8]),
+        max_range_m: source.one_of(&[30.0, 2.0]),
+        sector_width_deg: source.one_of(&[5.0, 18.0, 0.5]),
+        ..MapSettings::default()
+    }
+}
+
+/// A disparity picture, stroke by stroke: planes, the ground, noise, reasons, cuts along tiles, and any bits at all.
+pub(crate) fn draw(source: &mut Source<'_>, camera: &Camera, pixels: &mut Vec<DisparityPixel>) {
+    let (width, height) = (camera.pair.width as usize, camera.pair.height as usize);
+    let eye = Eye::new(&camera.pair, &camera.mount);
+    pixels.clear();
+    pixels.resize(width * height, DisparityPixel::from_bits(0));
+    for _ in 0..1 + source.below(10) {
+        let kind = source.below(8);
+        if kind == 7 {
+            let place = usize::from(source.word()) % pixels.len();
+            pixels[place] = DisparityPixel::from_bits(source.word());
+            continue;
+        }
+        if kind == 5 {
+            ledge(source, (width, height), camera.settings.surfaces.step_sixteenths, pixels);
+            continue;
+        }
+        if kind == 6 {
+            cut(source, (width, height), pixels);
+            continue;
+        }
+        let (left, top) = (source.below(width), source.below(height));
+        let (columns, rows) = (1 + source.below(width - left), 1 + source.below(height - top));
+        let base = i32::from(source.word() % 1024);
+        let slope = [i32::from(source.byte() as i8), i32::from(source.byte() as i8)];
+        let mut noise = u32::from(source.byte()) | 1;
+        for y in top..top + rows {
+            for x in left..left + columns {
+                let steps = base + (slope[0] * (x - left) as i32 + slope[1] * (y - top) as i32) / 8;
+                let bits = match kind {
+                    // The ground as the mount promises it, a little off.
+                    0 | 1 => eye.ground_steps(x, y) + (base & 7) - 3,
+                    2 => {
+                        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                        steps + (noise >> 28) as i32
+                    }
+                    3 => 0x8000 | (base & 15),
+                    _ => steps,
+                };
+                pixels[y * width + x] = DisparityPixel::from_bits(bits as u16);
+            }
+        }
+    }
+}
+
+/// Fills the picture with two disparities that meet at the border of a tile and differ by about as much as a surface may bridge.
+fn ledge(source: &mut Source<'_>, (width, height): (usize, usize), step: u16, pixels: &mut [DisparityPixel]) {
+    let along_row = source.flag();
+    let near = 1 + u16::from(source.byte()) / 2;
+    let far = near.saturating_add(step).saturating_add(source.below(4) as u16).saturating_sub(1);
+    for (place, pixel) in pixels.iter_mut().enumerate().take(width * height) {
+        let beyond = if along_row { place / width } else { place % width } >= TILE;
+        *pixel = DisparityPixel::from_steps(if beyond { far } else { near });
+    }
+}
+
+/// Cuts the picture at the border of a tile but for one pixel, mostly at an end of the cut: what lies on both sides hangs together
+/// only there.
+fn cut(source: &mut Source<'_>, (width, height): (usize, usize), pixels: &mut [DisparityPixel]) {
+    let along_row = source.flag();
+    let (length, across) = if along_row { (width, height) } else { (height, width) };
+    let at = (TILE - 1 + source.below(2)).min(across - 1);
+    let any = source.below(length);
+    let open = source.one_of(&[length - 1, 0, TILE - 1, TILE, any]);
+    for place in (0..length).filter(|place| *place != open) {
+        let (x, y) = if along_row { (place, at) } else { (at, place) };
+        pixels[y * width + x] = DisparityPixel::none(Reason::LowTexture);
+    }
+}
+
+/// Where a pixel's point lies, in f64 and by formulae of its own.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eye {
+    /// Forward, left and up in the vehicle frame, by right, down and ahead in the camera's.
+    rows: [[f64; 3]; 3],
+    origin_m: [f64; 3],
+    /// Sine and cosine of the heading.
+    heading: (f64, f64),
+    focal_px: f64,
+    middle: [f64; 2],
+    scale: f64,
+    offset_px: f64,
+}
+
+impl Eye {
+    pub(crate) fn new(pair: &RectifiedPair, mount: &Mount) -> Self {
+        let [pitch, roll, yaw] =
+            [mount.pitch_down_deg, mount.roll_deg, mount.yaw_left_deg].map(|angle| f64::from(angle).to_radians());
+        // A camera that leans to the right sees the level direction to the right turned to its left.
+        let right = [roll.cos(), -roll.sin(), 0.0];
+        let down = [roll.sin(), roll.cos(), 0.0];
+        let ahead = [0.0, 0.0, 1.0];
+        let mix = |a: f64, b: f64| [0, 1, 2].map(|i| a * ahead[i] + b * down[i]);
+        let forward = mix(pitch.cos(), -pitch.sin());
+        let up = mix(-pitch.sin(), -pitch.cos());
+        let height_m = mount.height_m.unwrap_or(Mount::ASSUMED_HEIGHT_M);
+        Self {
+            rows: [forward, right.map(|r| -r), up],
+            origin_m: [mount.forward_m, mount.left_m, height_m].map(f64::from),
+            heading: yaw.sin_cos(),
+            focal_px: f64::from(pair.focal_px),
+            middle: [f64::from(pair.cx), f64::from(pair.cy)],
+            scale: f64::from(pair.focal_px) * f64::from(pair.baseline_m),
+            offset_px: f64::from(pair.disparity_offset_px),
+        }
+    }
+
+    /// Direction of a pixel's ray with the heading of the camera, of length 1 along the optical axis.
+    fn ray(&self, x: usize, y: usize) -> [f64; 3] {
+        let camera = [(x as f64 - self.middle[0]) / self.focal_px, (y as f64 - self.middle[1]) / self.focal_px, 1.0];
+        self.rows.map(|row| row[0] * camera[0] + row[1] * camera[1] + row[2] * camera[2])
+    }
+
+    /// The point in the frame of the pair, on the ground below the left camera, metres.
+    pub(crate) fn in_pair(&self, x: usize, y: usize, steps: u16) -> [f64; 3] {
+        let z = self.scale / (f64::from(steps) / 16.0 + self.offset_px);
+        let [forward, left, up] = self.ray(x, y);
+        [z * forward, z * left, self.origin_m[2] + z * up]
+    }
+
+    /// The point in the vehicle frame, metres.
+    pub(crate) fn point(&self, x: usize, y: usize, steps: u16) -> [f64; 3] {
+        let [forward, left, up] = self.in_pair(x, y, steps);
+        let (sin, cos) = self.heading;
+        [self.origin_m[0] + forward * cos - left * sin, self.origin_m[1] + forward * sin + left * cos, up]
+    }
+
+    /// Distance of the camera from a point on the ground of the vehicle frame, metres.
+    pub(crate) fn range_m(&self, [x, y]: [f64; 2]) -> f64 {
+        (x - self.origin_m[0]).hypot(y - self.origin_m[1])
+    }
+
+    /// Disparity of level ground, 1/16 px; 0 above the horizon.
+    fn ground_steps(&self, x: usize, y: usize) -> i32 {
+        let up = self.ray(x, y)[2];
+        if up >= -1.0e-3 {
+            return 0;
+        }
+        let z = self.origin_m[2] / -up;
+        (16.0 * (self.scale / z - self.offset_px)).round().clamp(0.0, 32767.0) as i32
+    }
+}
+
+/// Two detectors, each with one of the backends that this processor has, and what remembers which: to ask for one takes long.
+pub(crate) struct Two {
+    pub(crate) first: Small,
+    pub(crate) second: Small,
+    backends: [Backend; 2],
+}
+
+impl Two {
+    pub(crate) const fn new() -> Self {
+        Self { first: Small::new(), second: Small::new(), backends: [Backend::Neon; 2] }
+    }
+
+    /// Chooses the backends anew, now and then.
+    pub(crate) fn choose(&mut self, source: &mut Source<'_>) {
+        let choice = usize::from(source.byte());
+        let wanted = [choice % 8, choice / 8 % 8].map(|i| Backend::ALL.get(i).copied().unwrap_or(Backend::Plain));
+        for ((detector, known), wanted) in
+            [&mut self.first, &mut self.second].into_iter().zip(&mut self.backends).zip(wanted)
+        {
+            if *known != wanted && !detector.set_backend(wanted) {
+                detector.set_backend(Backend::Plain);
+            }
+            *known = wanted;
+        }
+    }
+}

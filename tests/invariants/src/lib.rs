@@ -1,0 +1,71 @@
+//! What must hold of Fencepost whatever comes in.
+//!
+//! Each [`Target`] takes any bytes, makes an input of them (geometry within capacity, pictures, frames, files), runs it, and panics
+//! if something does not hold that must. The fuzzers in `fuzz/` run the targets, the tests of this crate run the same with proptest,
+//! on the seeds and on all that fuzzing has found. See `docs/fuzzing.md`.
+#![deny(unsafe_code)]
+
+#[cfg(feature = "host")]
+mod calibration;
+mod camera;
+mod command;
+mod detection;
+mod disparity;
+mod frames;
+#[cfg(feature = "host")]
+mod live;
+mod pairs;
+#[cfg(feature = "host")]
+mod pixels;
+mod receiver;
+#[cfg(feature = "host")]
+mod recording;
+mod rectifier;
+#[cfg(feature = "host")]
+mod rig;
+mod seeds;
+mod source;
+mod surfaces;
+
+pub use seeds::seeds;
+pub use source::Source;
+
+/// One way in.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    /// Its name: that of the fuzzer, of the folder of its regressions, and of its test.
+    pub name: &'static str,
+    /// Whether it is one of the core's, of which more is asked.
+    pub core: bool,
+    /// Runs one input.
+    pub run: fn(&[u8]),
+}
+
+/// Every target, the core's first.
+pub const TARGETS: &[Target] = &[
+    Target { name: "surfaces", core: true, run: surfaces::run },
+    Target { name: "disparity", core: true, run: disparity::run },
+    Target { name: "pairs", core: true, run: pairs::run },
+    Target { name: "rectifier", core: true, run: rectifier::run },
+    Target { name: "receiver", core: true, run: receiver::run },
+    Target { name: "command", core: true, run: command::run },
+    #[cfg(feature = "host")]
+    Target { name: "calibration", core: false, run: calibration::run },
+    #[cfg(feature = "host")]
+    Target { name: "recording", core: false, run: recording::run },
+    #[cfg(feature = "host")]
+    Target { name: "rig", core: false, run: rig::run },
+    #[cfg(feature = "host")]
+    Target { name: "pixels", core: false, run: pixels::run },
+    #[cfg(feature = "host")]
+    Target { name: "live", core: false, run: live::run },
+];
+
+/// Runs one input of the target of that name.
+///
+/// # Panics
+/// If there is no such target, and if something does not hold.
+pub fn run(name: &str, bytes: &[u8]) {
+    let target = TARGETS.iter().find(|target| target.name == name).unwrap_or_else(|| panic!("no target {name}"));
+    (target.run)(bytes);
+}
