@@ -32,10 +32,11 @@ impl Sums {
         let entering = columns.get(search.range.start + search.radius..).unwrap_or_default();
         let mut sum = leaving.iter().take(2 * search.radius + 1).fold(0u32, |sum, &column| sum.wrapping_add(column));
         // What changes first, many at a time, so that only one addition waits for the one before.
-        for ((out, &enter), &leave) in self.0.iter_mut().zip(entering).zip(leaving) {
+        let sums = self.0.get_mut(..search.range.len()).unwrap_or_default();
+        for ((out, &enter), &leave) in sums.iter_mut().zip(entering).zip(leaving) {
             *out = enter.wrapping_sub(leave);
         }
-        for out in &mut self.0 {
+        for out in sums {
             sum = sum.wrapping_add(*out);
             *out = sum;
         }
@@ -98,37 +99,45 @@ impl Decide {
         let [largest_first, smallest_first] =
             [near(search.range.start, search.right_first), near(search.range.start + 1, search.right_end)];
         let none = |reason: Reason| DisparityPixel::none(reason).bits();
-        let offsets = self.offsets(search, found);
-        let flags = self.flags(sums);
-        let (mut decided, mut untold) = ([0u16; CHUNK], [0u8; CHUNK]);
-        // Arrays of one length and one step for each pixel: this becomes vector instructions.
-        for i in 0..CHUNK {
-            let largest = top.min(largest_first + i as i16);
-            let smallest = min_disparity.max(smallest_first + i as i16);
-            let above = found.above[i];
-            // The two places beside the best one do not count.
-            let beside = 1 + u16::from(found.nearer[i] < above) + u16::from(found.farther[i] < above);
-            let weak_here = found.weak[i] != 0;
-            let unique = if weak_here { self.unique[1] } else { self.unique[0] };
-            let ambiguous = unique & (found.near[i] > beside);
-            let disparity = top.wrapping_sub(found.place[i] as i16);
-            let steps = disparity.wrapping_mul(16).wrapping_add(offsets[i]).max(0);
-            // As `DisparityPixel::from_steps`; steps are below 32768 because disparities are below 2048.
-            let bits = if steps == 0 { none(Reason::OutOfRange) } else { steps as u16 };
-            let bits = if ambiguous { none(Reason::NotUnique) } else { bits };
-            // At an end of the range the true minimum may lie beyond, and there is no neighbour to interpolate with.
-            let at_end = (disparity >= largest) | (disparity <= smallest);
-            let bits = if at_end { none(Reason::OutOfRange) } else { bits };
-            let bits = if flags[i] & LOW_TEXTURE != 0 { none(Reason::LowTexture) } else { bits };
-            let bits = if flags[i] & SATURATED != 0 { none(Reason::Saturated) } else { bits };
-            let told_apart = (bits != none(Reason::LowTexture)) & (bits != none(Reason::NotUnique));
-            untold[i] = u8::from(!told_apart & weak_here);
-            decided[i] = if largest < smallest { 0 } else { bits };
+        let (mut decided, mut untold) = ([[0u16; PART]; CHUNK / PART], [[0u8; PART]; CHUNK / PART]);
+        // Runs of weak pixels are short: no more parts of the chunk than there are pixels in.
+        let parts = search.range.len().div_ceil(PART);
+        for (number, (decided, untold)) in decided.iter_mut().zip(&mut untold).enumerate().take(parts) {
+            let [farther, best, nearer] = [&found.farther, &found.best, &found.nearer].map(|all| part(all, number));
+            let [near, place] = [&found.near, &found.place].map(|all| part(all, number));
+            let (above, weak) = (part(&found.above, number), part(&found.weak, number));
+            let offsets = self.offsets(search, [farther, best, nearer]);
+            let flags = self.flags(part(&sums.0, number));
+            let first = (number * PART) as i16;
+            // Arrays of one length and one step for each pixel: this becomes vector instructions.
+            for i in 0..PART {
+                let largest = top.min(largest_first + first + i as i16);
+                let smallest = min_disparity.max(smallest_first + first + i as i16);
+                // The two places beside the best one do not count.
+                let beside = 1 + u16::from(nearer[i] < above[i]) + u16::from(farther[i] < above[i]);
+                let weak_here = weak[i] != 0;
+                let unique = if weak_here { self.unique[1] } else { self.unique[0] };
+                let ambiguous = unique & (near[i] > beside);
+                let disparity = top.wrapping_sub(place[i] as i16);
+                let steps = disparity.wrapping_mul(16).wrapping_add(offsets[i]).max(0);
+                // As `DisparityPixel::from_steps`; steps are below 32768 because disparities are below 2048.
+                let bits = if steps == 0 { none(Reason::OutOfRange) } else { steps as u16 };
+                let bits = if ambiguous { none(Reason::NotUnique) } else { bits };
+                // At an end of the range the true minimum may lie beyond, and there is no neighbour to interpolate with.
+                let at_end = (disparity >= largest) | (disparity <= smallest);
+                let bits = if at_end { none(Reason::OutOfRange) } else { bits };
+                let bits = if flags[i] & LOW_TEXTURE != 0 { none(Reason::LowTexture) } else { bits };
+                let bits = if flags[i] & SATURATED != 0 { none(Reason::Saturated) } else { bits };
+                let told_apart = (bits != none(Reason::LowTexture)) & (bits != none(Reason::NotUnique));
+                untold[i] = u8::from(!told_apart & weak_here);
+                decided[i] = if largest < smallest { 0 } else { bits };
+            }
         }
+        let (decided, untold) = (decided.as_flattened(), untold.as_flattened());
         if search.right_first >= search.right_end {
             return;
         }
-        for ((out, weak), (&decided, &untold)) in out.iter_mut().zip(weak).zip(decided.iter().zip(&untold)) {
+        for ((out, weak), (&decided, &untold)) in out.iter_mut().zip(weak).zip(decided.iter().zip(untold)) {
             let takes = (decided != 0) & (*weak | !self.only_weak);
             *out = if takes { DisparityPixel::from_bits(decided) } else { *out };
             *weak = if self.only_weak { *weak } else { takes & (untold != 0) };
@@ -137,11 +146,11 @@ impl Decide {
 
     /// How far from the best place the least cost lies, 1/16 px.
     #[inline(always)]
-    fn offsets(&self, search: &Search, found: &Found) -> [i16; CHUNK] {
+    fn offsets(&self, search: &Search, [farther, best, nearer]: [&[i16; PART]; 3]) -> [i16; PART] {
         let shift = if self.keys { 7 } else { 0 };
         let cost = |number: i16| number.wrapping_sub(i16::MIN) as u16 >> shift;
-        let mut offsets = [0; CHUNK];
-        let all = offsets.iter_mut().zip(&found.farther).zip(&found.best).zip(&found.nearer);
+        let mut offsets = [0; PART];
+        let all = offsets.iter_mut().zip(farther).zip(best).zip(nearer);
         if self.keys | search.is_small {
             // What stands where there is no cost is larger, and does not matter.
             let small = |number: i16| cost(number).min(MOST_SMALL) as i16;
@@ -159,15 +168,24 @@ impl Decide {
 
     /// [`LOW_TEXTURE`] and [`SATURATED`] of each pixel.
     #[inline(always)]
-    fn flags(&self, sums: &Sums) -> [u8; CHUNK] {
-        let mut flags = [0; CHUNK];
-        for (flags, &sum) in flags.iter_mut().zip(&sums.0) {
+    fn flags(&self, sums: &[u32; PART]) -> [u8; PART] {
+        let mut flags = [0; PART];
+        for (flags, &sum) in flags.iter_mut().zip(sums) {
             let low = u8::from(texture(sum) < self.min_texture);
             let saturated = u8::from(sum >> TEXTURE_BITS > self.max_saturated);
             *flags = low * LOW_TEXTURE | saturated * SATURATED;
         }
         flags
     }
+}
+
+/// Pixels that are decided on together.
+const PART: usize = 16;
+
+/// One of the parts of a chunk.
+#[inline(always)]
+fn part<T>(all: &[T; CHUNK], number: usize) -> &[T; PART] {
+    &all.as_chunks().0[number % (CHUNK / PART)]
 }
 
 const LOW_TEXTURE: u8 = 1;
