@@ -173,7 +173,7 @@ impl Decide {
         for (flags, &sum) in flags.iter_mut().zip(sums) {
             let low = u8::from(texture(sum) < self.min_texture);
             let saturated = u8::from(sum >> TEXTURE_BITS > self.max_saturated);
-            *flags = low * LOW_TEXTURE | saturated * SATURATED;
+            *flags = (low * LOW_TEXTURE) | (saturated * SATURATED);
         }
         flags
     }
