@@ -53,10 +53,6 @@ pub(crate) struct Search {
     /// How much better than any other a place must be: where there is texture, and where it is weak.
     pub(crate) uniqueness_percent: [u16; 2],
     /// Whether no cost is above 2040 and no sum of a column above 127.
-    #[cfg_attr(
-        not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"), dsp)),
-        expect(dead_code, reason = "plain Rust has one way for all costs")
-    )]
     pub(crate) is_small: bool,
 }
 

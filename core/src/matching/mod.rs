@@ -253,7 +253,7 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
             right_first: usize::from(right.start) + margin,
             right_end: usize::from(right.end).min(self.width).saturating_sub(margin),
             uniqueness_percent,
-            is_small: settings.window_height <= 127 / 8 && area <= 2040 / 8,
+            is_small: settings.cost == MatchCost::Census && settings.window_height <= 127 / 8 && area <= 2040 / 8,
         };
         if window == Window::Narrow {
             self.right.begin();
