@@ -107,7 +107,7 @@ impl Decide {
         let (mut decided, mut untold) = ([[0u16; PART]; CHUNK / PART], [[0u8; PART]; CHUNK / PART]);
         // Runs of weak pixels are short: no more parts of the chunk than there are pixels in.
         let parts = search.range.len().saturating_add(PART - 1) / PART;
-        for (number, (decided, untold)) in decided.iter_mut().zip(&mut untold).enumerate().take(parts) {
+        for (number, (decided, untold)) in (0..parts).zip(decided.iter_mut().zip(&mut untold)) {
             let [farther, best, nearer] = [&found.farther, &found.best, &found.nearer].map(|all| part(all, number));
             let [near, place] = [&found.near, &found.place].map(|all| part(all, number));
             let (above, weak) = (part(&found.above, number), part(&found.weak, number));
