@@ -364,7 +364,9 @@ fn least_cost(
         let lanes = upto.wrapping_sub(from);
         let least = costs.iter().take(lanes).copied().min().unwrap_or(u16::MAX);
         if best.is_none_or(|(cost, _)| u32::from(least) < cost) {
-            let lane = (0..lanes).zip(&costs).filter(|(_, cost)| **cost == least).map(|(lane, _)| lane).last();
+            // The last of equals, without the reversed zip that could panic.
+            let lane =
+                (0..lanes).zip(&costs).fold(None, |last, (lane, cost)| if *cost == least { Some(lane) } else { last });
             // Not to the right of the place in the left picture: no disparity is negative.
             best = lane.map(|lane| (u32::from(least), x.wrapping_sub(from).wrapping_sub(lane))).or(best);
         }

@@ -76,7 +76,7 @@ impl Stages {
         let mut place_of = vec![None; flood.sizes.len()];
         let mut sums = vec![Sums::default(); surfaces.table().len()];
         let eye = Eye::new(&camera.pair, &camera.mount);
-        for place in 0..pixels.len() {
+        for (place, pixel) in pixels.iter().enumerate() {
             let (x, y) = (place % width, place / width);
             let Some(part) = flood.part(place) else {
                 assert_eq!(surfaces.place_at(x, y), None, "a surface where nothing is");
@@ -86,7 +86,7 @@ impl Stages {
             let known = place_of[part].get_or_insert(in_table);
             assert_eq!(*known, in_table, "a surface in pieces");
             if let Some(in_table) = in_table {
-                sums[in_table].add(eye.in_pair(x, y, pixels[place].steps()));
+                sums[in_table].add(eye.in_pair(x, y, pixel.steps()));
             }
         }
         let kept = |kept: bool| {
