@@ -48,7 +48,8 @@ impl Painted {
     }
 
     fn bad(&self) -> impl Iterator<Item = String> {
-        let deepest = self.rows.iter().max_by_key(|(_, seen, _)| *seen);
+        // By its bound: what was seen of it is what is in question.
+        let deepest = self.rows.iter().max_by_key(|(_, _, bound)| *bound);
         let near = deepest.is_some_and(|(_, seen, bound)| bound.is_some_and(|b| 100 * seen >= LEAST_PERCENT * b));
         let far = (!near).then(|| format!("the deepest entry takes less than {LEAST_PERCENT} % of its bound"));
         let over = self.rows.iter().filter_map(|(name, seen, bound)| match bound {
