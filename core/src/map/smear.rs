@@ -43,3 +43,7 @@ pub(super) fn take_out<const CELLS: usize>(map: &mut ObstacleMap<CELLS>, place: 
         }
     }
 }
+
+#[cfg(test)]
+#[path = "smear_tests.rs"]
+mod tests;

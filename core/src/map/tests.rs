@@ -5,7 +5,7 @@ use std::{boxed::Box, vec, vec::Vec};
 use super::*;
 use crate::{
     disparity::{DisparityPicture, DisparityPixel, Reason},
-    geometry::{Mount, Place},
+    geometry::Place,
     ground::{GroundPlane, GroundSettings},
     obstacles::ObstacleSettings,
     surfaces::{Surface, SurfaceClass, TILE},
@@ -505,63 +505,6 @@ fn cells_behind_obstacles_are_hidden_as_rays_say() {
     }
     std::println!("{hidden} hidden, {open} open");
     assert!(hidden > 1000 && open > 1000);
-}
-
-#[test]
-fn obstacles_smear_cells_with_few_pixels_right_behind_them() {
-    let settings = MapSettings::default();
-    let geometry = MapGeometry { cell_size_mm: 500, x_first: 0, x_count: 40, y_first: -20, y_count: 40 };
-    // A thing in cell (10, j) with 400 pixels, and what lies `behind` it in its direction.
-    let left_over = |j: i16, behind: &[(i16, u16)], settings: &MapSettings| {
-        let mut map = ObstacleMap::<CELLS> { geometry, cells: heapless::Vec::new() };
-        for _ in 0..geometry.len() {
-            map.cells.push(Cell::default()).unwrap();
-        }
-        let (x, y) = geometry.centre_m(10, j);
-        let along = |cells: i16| {
-            let far = 1.0 + f32::from(cells) * 0.5 / x;
-            geometry.index((x * far / 0.5).floor() as i16, (y * far / 0.5).floor() as i16).unwrap()
-        };
-        for (cells, pixels) in behind.iter().chain([&(0, 400)]) {
-            map.cells[along(*cells)] = Cell { state: CellState::Obstacle, pixels: *pixels, ..Cell::default() };
-        }
-        smear::take_out(&mut map, &Place::ORIGIN, settings);
-        let state = |cells: i16| map.cells[along(cells)].state;
-        assert_eq!(state(0), CellState::Obstacle, "the thing itself stays");
-        behind.iter().map(|(cells, _)| state(*cells) == CellState::Obstacle).collect::<Vec<_>>()
-    };
-    for j in [-8, -1, 0, 5] {
-        assert_eq!(left_over(j, &[(1, 99)], &settings), [false], "{j}");
-        assert_eq!(left_over(j, &[(2, 99)], &settings), [false], "{j}");
-        assert_eq!(left_over(j, &[(3, 99)], &settings), [true], "{j}: too far behind");
-        assert_eq!(left_over(j, &[(1, 140)], &settings), [true], "{j}: enough of its own");
-        // What was taken out still stands for nothing itself.
-        assert_eq!(left_over(j, &[(2, 90), (3, 20)], &settings), [false, false], "{j}");
-        let never = MapSettings { smear_share: 0.0, ..settings };
-        assert_eq!(left_over(j, &[(1, 1)], &never), [true], "{j}");
-    }
-}
-
-#[test]
-fn a_thing_on_the_border_of_two_cells_smears_with_the_pixels_of_both() {
-    let settings = MapSettings::default();
-    let geometry = MapGeometry { cell_size_mm: 500, x_first: 0, x_count: 40, y_first: -20, y_count: 40 };
-    // Seen from five metres to the right, the line of sight to the last cell passes the border between the two before it.
-    let place = Place::new(&Mount { left_m: -5.0, ..Mount::default() });
-    let stays = |left: u16, right: u16| {
-        let mut map = ObstacleMap::<CELLS> { geometry, cells: heapless::Vec::new() };
-        for _ in 0..geometry.len() {
-            map.cells.push(Cell::default()).unwrap();
-        }
-        for (i, j, pixels) in [(20, 0, left), (20, -1, right), (21, 0, 120)] {
-            let cell = &mut map.cells[geometry.index(i, j).unwrap()];
-            *cell = Cell { state: CellState::Obstacle, pixels, ..Cell::default() };
-        }
-        smear::take_out(&mut map, &place, &settings);
-        map.cells[geometry.index(21, 0).unwrap()].state == CellState::Obstacle
-    };
-    assert!(stays(200, 0) && stays(0, 200), "either by itself is too little");
-    assert!(!stays(200, 200), "both together are enough");
 }
 
 #[test]
