@@ -53,6 +53,8 @@ impl Crew {
         let pool = builder().use_current_thread().build().or_else(|_| builder().build());
         let pool =
             pool.map_err(|error| Failure::work(format!("{threads} threads for a pair cannot be had: {error}")))?;
+        // Threads take some memory of their own when they look for work for the first time, which may be late: they all do so now.
+        pool.broadcast(|_| ());
         let bands = BANDS[index].lock().unwrap_or_else(PoisonError::into_inner);
         Ok(Self { helpers: Some((bands, Helpers { pool, threads })) })
     }

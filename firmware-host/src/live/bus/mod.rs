@@ -184,6 +184,12 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
 
     /// Works until it is told to stop, or until no pair will see anything any more.
     pub(super) fn run(mut self) -> BusReport {
+        // The first word is that it starts, also where this thread comes so late that pictures were seen already.
+        let now_ns = monotonic_ns();
+        self.judge(now_ns);
+        self.heartbeat_if_due(now_ns);
+        // A heartbeat that waits gives way to a newer one. What becomes of it is looked at with the next.
+        let _ = self.pump();
         loop {
             let stopping = self.shared.stop.load(Ordering::Relaxed);
             let now_ns = monotonic_ns();
