@@ -19,7 +19,7 @@
 //!
 //! Beside that some 40 instructions for each pixel: the least of a vector, its neighbours, what is found. SSE2 takes twice as many
 //! vectors, and 25 instead of 7 to count bits without look-up. AVX-512 and NEON count bits by an instruction, which saves half of the
-//! loads of the codes and of the arithmetic; NEON finds the least of a vector by one, too. To decide takes some 60 instructions for eight pixels. The
+//! loads of the codes and of the arithmetic; NEON finds the least of a vector by one, too. The
 //! wide window is asked for weak pixels only, and made afresh at each run of them.
 
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
