@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use fencepost_core::{
     health::{HealthLevel, HealthReason},
-    wire::{CommandEncoder, VehicleMotionRepr},
+    wire::{CommandEncoder, HeartbeatRepr, VehicleMotionRepr},
 };
 use fencepost_hal::{
     camera::{FaultyCamera, MemoryCamera, PacedCamera, Sides},
@@ -58,7 +58,7 @@ fn healthy_with(settings: fencepost::live::RunSettings) -> Setup {
     Setup { bus, listener, orders, running, healthy_ns }
 }
 
-fn wait_for(what: &str, condition: impl Fn() -> bool) {
+fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
     let start = std::time::Instant::now();
     while !condition() {
         assert!(start.elapsed() < crate::listener::PATIENCE, "{what} did not happen");
@@ -138,7 +138,9 @@ fn a_bus_that_goes_and_comes_is_told_of_when_it_is_back() {
 
 #[test]
 fn a_controller_that_stops_is_missed() {
-    let Setup { bus, listener, running, healthy_ns, .. } = healthy();
+    // So long that a controller that works is never missed, however slowly this thread gets on.
+    let settings = fencepost::live::RunSettings { command_timeout_ms: 1500, echo_timeout_ms: 2000, ..patient() };
+    let Setup { bus, listener, running, healthy_ns, .. } = healthy_with(settings);
     let mut controller = bus.attach();
     let mut encoder = CommandEncoder::new(address());
     let mut send = |frame: fencepost_core::wire::Frame, damaged: bool| {
@@ -146,47 +148,41 @@ fn a_controller_that_stops_is_missed() {
         let can = if damaged { can.map_data(|data| data[2] ^= 1) } else { can };
         controller.send(&can, now_ns()).unwrap();
     };
-    // A controller that works.
     let motion = VehicleMotionRepr { speed_mm_per_s: Some(500), yaw_rate_cdeg_per_s: Some(0) };
     let newest = || listener.heartbeats().last().and_then(|(_, heartbeat)| heartbeat.last_scan).unwrap();
-    for _ in 0..40 {
+    let mut speak = |echo: u16| {
         send(encoder.vehicle_motion(&motion), false);
-        send(encoder.scan_echo(newest()), false);
+        send(encoder.scan_echo(echo), false);
         std::thread::sleep(Duration::from_millis(25));
+    };
+    // A controller that works.
+    for _ in 0..40 {
+        speak(newest());
     }
     let spoke_ns = now_ns();
     let spoken = listener.heartbeats().into_iter().filter(|(at_ns, _)| (healthy_ns..spoke_ns).contains(at_ns));
     for (_, heartbeat) in spoken {
         assert!(!heartbeat.health.has(HealthReason::EchoMissing), "{heartbeat:?}");
     }
+    let said = |since_ns: u64, wanted: &dyn Fn(&HeartbeatRepr) -> bool| {
+        listener.heartbeats().iter().any(|(at_ns, heartbeat)| *at_ns >= since_ns && wanted(heartbeat))
+    };
     // It repeats its last echo: that is no sign of life.
     let last = newest();
     let hangs_ns = now_ns();
-    for _ in 0..60 {
-        send(encoder.vehicle_motion(&motion), false);
-        send(encoder.scan_echo(last), false);
-        std::thread::sleep(Duration::from_millis(25));
-    }
-    listener.wait_for_reason(HealthReason::EchoMissing, hangs_ns);
+    wait_for("a missing echo", || {
+        speak(last);
+        said(hangs_ns, &|heartbeat| heartbeat.health.has(HealthReason::EchoMissing))
+    });
     // It is silent.
     let silent_ns = now_ns();
     listener.wait_for_reason(HealthReason::CommandTrouble, silent_ns);
-    // It is back.
-    for _ in 0..30 {
-        send(encoder.vehicle_motion(&motion), false);
-        send(encoder.scan_echo(newest()), false);
-        std::thread::sleep(Duration::from_millis(25));
-    }
+    // It is back, and goes on speaking.
     let back_ns = now_ns();
-    let mut echo = || {
-        send(encoder.vehicle_motion(&motion), false);
-        send(encoder.scan_echo(newest()), false);
-        std::thread::sleep(Duration::from_millis(25));
-    };
-    wait_for("healthy again", || {
-        listener.heartbeats().last().is_some_and(|(at, h)| *at >= back_ns && h.health.level == HealthLevel::Ok)
+    wait_for("health after it is back", || {
+        speak(newest());
+        said(back_ns, &|heartbeat| heartbeat.health.level == HealthLevel::Ok)
     });
-    echo();
     // A damaged message.
     let damaged_ns = now_ns();
     send(encoder.vehicle_motion(&motion), true);
