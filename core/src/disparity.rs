@@ -2,6 +2,8 @@
 
 use fixed::{FixedU16, types::extra::U4};
 
+use crate::arch::{self, Chosen, Steps};
+
 /// Disparity in pixels of the left picture, `x_left - x_right`, with 4 fraction bits: steps of 1/16 px.
 pub type Disparity = FixedU16<U4>;
 
@@ -153,7 +155,14 @@ impl<'a> DisparityPicture<'a> {
     ///
     /// # Bound
     /// Eight comparisons for each pixel, many side by side.
-    pub(crate) fn counts(&self) -> (u32, [u32; Reason::ALL.len()]) {
+    pub(crate) fn counts(&self, chosen: Chosen) -> (u32, [u32; Reason::ALL.len()]) {
+        let mut counts = Default::default();
+        arch::compiled(chosen, Count { picture: self, counts: &mut counts });
+        counts
+    }
+
+    #[inline(always)]
+    fn count(&self) -> (u32, [u32; Reason::ALL.len()]) {
         let mut with = 0u32;
         let mut without = [0u32; Reason::ALL.len()];
         // In short pieces counts fit 16 bits, as wide as the pixels.
@@ -179,6 +188,19 @@ impl<'a> DisparityPicture<'a> {
     /// All pixels, row by row.
     pub const fn pixels(&self) -> &'a [DisparityPixel] {
         self.pixels
+    }
+}
+
+/// Counts pixels with the instructions of a backend.
+struct Count<'a> {
+    picture: &'a DisparityPicture<'a>,
+    counts: &'a mut (u32, [u32; Reason::ALL.len()]),
+}
+
+impl Steps for Count<'_> {
+    #[inline(always)]
+    fn run(self) {
+        *self.counts = self.picture.count();
     }
 }
 

@@ -68,6 +68,6 @@ fn counts_are_those_of_looking_at_each_pixel() {
                 Err(reason) => without[reason as usize] += 1,
             }
         }
-        assert_eq!(DisparityPicture::new(&pixels, 1).counts(), (with, without));
+        assert_eq!(DisparityPicture::new(&pixels, 1).counts(crate::arch::Chosen::PLAIN), (with, without));
     }
 }

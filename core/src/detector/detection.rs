@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use crate::{
+    arch::Chosen,
     disparity::DisparityPicture,
     ground::GroundPlane,
     health::{Health, HealthLevel},
@@ -128,12 +129,12 @@ impl Statistics {
 
     pub(super) fn count<const CELLS: usize>(
         &mut self,
-        picture: DisparityPicture<'_>,
+        (picture, chosen): (DisparityPicture<'_>, Chosen),
         report: SurfaceReport,
         surfaces: &[Surface],
         map: &ObstacleMap<CELLS>,
     ) {
-        let (with, without) = picture.counts();
+        let (with, without) = picture.counts(chosen);
         (self.pixels_with_disparity, self.pixels_without) = (with, without);
         self.surfaces = surfaces.len() as u32;
         self.surfaces_dropped = report.dropped;

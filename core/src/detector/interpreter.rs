@@ -171,6 +171,7 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
     /// Has the stages run with the instructions of a backend.
     pub(super) const fn choose(&mut self, chosen: Chosen) {
         self.surfaces.choose(chosen);
+        self.ground.choose(chosen);
         self.map.choose(chosen);
     }
 
@@ -200,7 +201,7 @@ impl<const PIXELS: usize, const WIDTH: usize, const DISPARITIES: usize, const SU
         if cross_check.is_some() {
             self.other.check(&mut detection.map, &self.confidence);
         }
-        detection.statistics.count(picture, report, self.surfaces.table(), &detection.map);
+        detection.statistics.count((picture, self.map.chosen()), report, self.surfaces.table(), &detection.map);
     }
 
     /// Runs one detector.

@@ -11,6 +11,7 @@ pub use terrain::Terrain;
 use terrain::Bend;
 
 use crate::{
+    arch::Chosen,
     disparity::DisparityPicture,
     error::ConfigError,
     geometry::{DepthTable, Rays, VehicleFrame},
@@ -49,6 +50,7 @@ pub struct GroundFinder {
     least_upright: f32,
     last: Option<GroundPlane>,
     terrain: Terrain,
+    chosen: Chosen,
 }
 
 impl GroundFinder {
@@ -66,7 +68,13 @@ impl GroundFinder {
             least_upright: 0.0,
             last: None,
             terrain: Terrain::new(),
+            chosen: Chosen::PLAIN,
         }
+    }
+
+    /// Has the terrain followed with the instructions of a backend.
+    pub(crate) const fn choose(&mut self, chosen: Chosen) {
+        self.chosen = chosen;
     }
 
     /// Takes settings, the frame of the vehicle and the size of the pictures, and forgets the ground of earlier frames.
@@ -136,7 +144,7 @@ impl GroundFinder {
                     tolerance_m: self.settings.surface_tolerance_m,
                     tolerance_per_m: self.settings.terrain_noise_px * plane.camera_height_m / focal_baseline_px_m,
                 };
-                self.terrain.fit(plane, surfaces, picture, geometry, &bend);
+                self.terrain.fit(plane, surfaces, picture, geometry, &bend, self.chosen);
             }
             None => self.terrain.flatten(GroundPlane::of_mount(&frame)),
         }

@@ -2,10 +2,11 @@
 
 use super::GroundPlane;
 use crate::{
+    arch::{self, Chosen, Steps},
     disparity::DisparityPicture,
     geometry::{DepthTable, Rays},
     lanes::floor,
-    surfaces::{SurfaceClass, Surfaces, TILE},
+    surfaces::{MAX_TILE_SURFACES, SurfaceClass, Surfaces, TILE},
     work::{self, Loop},
 };
 
@@ -16,6 +17,9 @@ const ACROSS: usize = 40;
 /// Of so many pixels along and across the rows one is looked at.
 const STEP_X: usize = 4;
 const STEP_Y: usize = 2;
+
+/// Points that are worked on side by side.
+const LANES: usize = 8;
 
 const _: () = assert!(TILE.is_multiple_of(STEP_X), "the first pixel of a tile is one that is looked at");
 
@@ -106,34 +110,15 @@ impl Terrain {
         picture: DisparityPicture<'_>,
         (depth, rays): (&DepthTable<DISPARITIES>, &Rays),
         bend: &Bend,
+        chosen: Chosen,
     ) {
         self.flatten(plane);
         self.patch_m = bend.patch_m;
-        // The surfaces of another picture say nothing about this one.
-        let height = if (picture.width(), picture.height()) == surfaces.size() { picture.height() } else { 0 };
         for round in [Round::Follow, Round::Trim, Round::Trim] {
             self.begin();
-            for y in (0..height).rev().step_by(STEP_Y) {
-                let (row, labels) = (picture.row(y), surfaces.labels_row(y));
-                for x0 in (0..row.len()).step_by(TILE) {
-                    let table = surfaces.of_tile(x0, y);
-                    if table.is_empty() {
-                        continue;
-                    }
-                    let end = x0.saturating_add(TILE).min(row.len());
-                    for x in (x0..end).step_by(STEP_X) {
-                        let (Some(pixel), Some(&label)) = (row.get(x), labels.get(x)) else { break };
-                        work::count(Loop::TerrainPixels, 1);
-                        let surface = usize::from(label).checked_sub(1).and_then(|i| table.get(i));
-                        let Some(surface) = surface.filter(|surface| surface.class != SurfaceClass::Vertical) else {
-                            continue;
-                        };
-                        let z = depth.distance_m(pixel.steps());
-                        let direction = rays.direction(x as f32, y as f32);
-                        let point: [f32; 3] = core::array::from_fn(|i| rays.origin_m[i] + z * direction[i]);
-                        self.add(round, point, surface.class == SurfaceClass::Ground, bend);
-                    }
-                }
+            // The surfaces of another picture say nothing about this one.
+            if (picture.width(), picture.height()) == surfaces.size() {
+                arch::compiled(chosen, Gather { terrain: self, round, surfaces, picture, depth, rays, bend });
             }
             self.settle(bend.share);
         }
@@ -165,38 +150,58 @@ impl Terrain {
         }
     }
 
-    /// Adds a point to its patch, if ground can be there; `sure` if its surface is known to be ground.
-    fn add(&mut self, round: Round, point: [f32; 3], sure: bool, bend: &Bend) {
-        let [ahead, across] = self.place(point[0], point[1]);
-        if ahead < 0.0 || across < 0.0 || ahead >= AHEAD as f32 || across >= ACROSS as f32 {
-            return;
+    /// The patch of each point; none outside of the terrain.
+    #[inline(always)]
+    fn patches(&self, points: &Points) -> [Option<usize>; LANES] {
+        let patches: [i32; LANES] = core::array::from_fn(|k| {
+            let [ahead, across] = self.place(points.x_m[k], points.y_m[k]);
+            let outside = (ahead < 0.0) | (across < 0.0) | (ahead >= AHEAD as f32) | (across >= ACROSS as f32);
+            let (i, j) = (floor(ahead, 0.0, (AHEAD - 1) as f32), floor(across, 0.0, (ACROSS - 1) as f32));
+            if outside { -1 } else { i.wrapping_mul(ACROSS as i32).wrapping_add(j) }
+        });
+        patches.map(|patch| usize::try_from(patch).ok())
+    }
+
+    /// Adds points to their patches where the ground goes on as what is known of it lets expect, one after the other: a point may make
+    /// the patch known in which the next one lies.
+    #[inline(always)]
+    fn follow(&mut self, points: &Points, bend: &Bend) {
+        for (k, patch) in (0..points.count.min(LANES)).zip(self.patches(points)) {
+            let Some(patch) = patch else { continue };
+            let (i, j, sure, height_m) = (patch / ACROSS, patch % ACROSS, points.sure[k], points.height_m[k]);
+            let (expected_m, reach_m) = self.expected_m(i, j, points.x_m[k], sure, bend);
+            // What stands there hides the ground, which is taken to go on under it: what lies behind is not reached over it.
+            if sure && height_m > expected_m + reach_m {
+                self.count(patch, expected_m);
+            }
+            if (height_m - expected_m).abs() <= reach_m {
+                self.count(patch, height_m);
+            }
         }
-        let (i, j) = (ahead as i32 as usize, across as i32 as usize);
-        let height_m = self.plane.height_m(point);
-        let tolerance_m = bend.tolerance_m + bend.tolerance_per_m * point[0];
-        let accepted = match round {
-            Round::Follow => {
-                let (expected_m, reach_m) = self.expected_m(i, j, point[0], sure, bend);
-                // What stands there hides the ground, which is taken to go on under it: what lies behind is not reached over it.
-                if sure && height_m > expected_m + reach_m {
-                    self.count(i, j, expected_m);
-                }
-                (height_m - expected_m).abs() <= reach_m
+    }
+
+    /// Adds points to their patches that neither rise above the terrain of the round before nor lie far below it.
+    #[inline(always)]
+    fn trim(&mut self, points: &Points, bend: &Bend) {
+        let (patches, lifts_m) = (self.patches(points), self.lifts_m(&points.x_m, &points.y_m));
+        let mut accepted = [false; LANES];
+        for k in 0..LANES {
+            let tolerance_m = bend.tolerance_m + bend.tolerance_per_m * points.x_m[k];
+            let above_m = points.height_m[k] - lifts_m[k];
+            accepted[k] = (above_m <= tolerance_m) & (above_m >= -LOWER * tolerance_m);
+        }
+        for (k, patch) in (0..points.count.min(LANES)).zip(patches) {
+            if let Some(patch) = patch.filter(|_| accepted[k]) {
+                self.count(patch, points.height_m[k]);
             }
-            Round::Trim => {
-                let above_m = height_m - self.lift_m(point[0], point[1]);
-                above_m <= tolerance_m && above_m >= -LOWER * tolerance_m
-            }
-        };
-        if accepted {
-            self.count(i, j, height_m);
         }
     }
 
     /// Counts a height in a patch.
-    fn count(&mut self, i: usize, j: usize, height_m: f32) {
-        let weight = self.weight.get_mut(i).and_then(|row| row.get_mut(j));
-        let sum_m = self.sum_m.get_mut(i).and_then(|row| row.get_mut(j));
+    #[inline(always)]
+    fn count(&mut self, patch: usize, height_m: f32) {
+        let weight = self.weight.as_flattened_mut().get_mut(patch);
+        let sum_m = self.sum_m.as_flattened_mut().get_mut(patch);
         if let Some((weight, sum_m)) = weight.zip(sum_m) {
             *weight += 1.0;
             *sum_m += height_m;
@@ -291,6 +296,116 @@ impl Terrain {
     }
 }
 
+/// Goes over the picture from the robot outwards and adds what may be ground to the terrain.
+struct Gather<'a, const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> {
+    terrain: &'a mut Terrain,
+    round: Round,
+    surfaces: &'a Surfaces<PIXELS, SURFACES>,
+    picture: DisparityPicture<'a>,
+    depth: &'a DepthTable<DISPARITIES>,
+    rays: &'a Rays,
+    bend: &'a Bend,
+}
+
+/// What the pixels of a surface say of the ground.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Says {
+    /// What stands upright, and what belongs to no surface.
+    Nothing,
+    MayBeGround,
+    Ground,
+}
+
+impl Says {
+    const fn of(class: SurfaceClass) -> Self {
+        match class {
+            SurfaceClass::Vertical => Self::Nothing,
+            SurfaceClass::Ground => Self::Ground,
+            _ => Self::MayBeGround,
+        }
+    }
+}
+
+/// Pixels of a row that are to become points, the first `count`, and how sure it is that they are ground.
+#[derive(Default)]
+struct Waiting {
+    count: usize,
+    column: [f32; LANES],
+    steps: [u16; LANES],
+    sure: [bool; LANES],
+}
+
+/// Points of a row in the frame of the vehicle, the first `count`, with their heights above the plane.
+struct Points {
+    count: usize,
+    x_m: [f32; LANES],
+    y_m: [f32; LANES],
+    height_m: [f32; LANES],
+    sure: [bool; LANES],
+}
+
+impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
+    for Gather<'_, PIXELS, SURFACES, DISPARITIES>
+{
+    #[inline(always)]
+    fn run(mut self) {
+        for y in (0..self.picture.height()).rev().step_by(STEP_Y) {
+            let (row, labels) = (self.picture.row(y), self.surfaces.labels_row(y));
+            let mut waiting = Waiting::default();
+            for x0 in (0..row.len()).step_by(TILE) {
+                let table = self.surfaces.of_tile(x0, y);
+                if table.is_empty() {
+                    continue;
+                }
+                let mut says = [Says::Nothing; MAX_TILE_SURFACES + 1];
+                for (says, surface) in says.iter_mut().skip(1).zip(table) {
+                    *says = Says::of(surface.class);
+                }
+                let end = x0.saturating_add(TILE).min(row.len());
+                for x in (x0..end).step_by(STEP_X) {
+                    let (Some(pixel), Some(&label)) = (row.get(x), labels.get(x)) else { break };
+                    work::count(Loop::TerrainPixels, 1);
+                    let says = says.get(usize::from(label)).copied().unwrap_or(Says::Nothing);
+                    // Written in any case, and kept if the pixel says something: what the next one is, no branch can foresee.
+                    let place = waiting.count % LANES;
+                    waiting.column[place] = x as f32;
+                    waiting.steps[place] = pixel.steps();
+                    waiting.sure[place] = says == Says::Ground;
+                    waiting.count = place.wrapping_add(usize::from(says != Says::Nothing));
+                    if waiting.count == LANES {
+                        self.points(y, &mut waiting);
+                    }
+                }
+            }
+            self.points(y, &mut waiting);
+        }
+    }
+}
+
+impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Gather<'_, PIXELS, SURFACES, DISPARITIES> {
+    /// Adds what waits of row `y`.
+    #[inline(always)]
+    fn points(&mut self, y: usize, waiting: &mut Waiting) {
+        let count = core::mem::take(&mut waiting.count);
+        if count == 0 {
+            return;
+        }
+        let Waiting { column, steps, sure, .. } = waiting;
+        let distances_m = self.depth.distances_m(steps);
+        let plane = *self.terrain.plane();
+        let mut points = Points { count, x_m: [0.0; LANES], y_m: [0.0; LANES], height_m: [0.0; LANES], sure: *sure };
+        for k in 0..LANES {
+            let point = self.rays.point_m(column[k], y as f32, distances_m[k]);
+            [points.x_m[k], points.y_m[k], _] = point;
+            points.height_m[k] = plane.height_m(point);
+        }
+        match self.round {
+            Round::Follow => self.terrain.follow(&points, self.bend),
+            Round::Trim => self.terrain.trim(&points, self.bend),
+        }
+    }
+}
+
 impl Default for Terrain {
     fn default() -> Self {
         Self::new()
@@ -300,30 +415,44 @@ impl Default for Terrain {
 /// Adds to every patch the others, each `share` to the power of its distance, along one side and then along the other.
 fn spread(patches: &mut [[f32; ACROSS]; AHEAD], share: f32) {
     work::count(Loop::TerrainPatches, 6 * AHEAD * ACROSS);
-    for row in patches.iter_mut() {
-        spread_line(row, share);
+    for rows in patches.as_chunks_mut::<LINES>().0 {
+        let mut lines: Lines<ACROSS> = core::array::from_fn(|k| core::array::from_fn(|row| rows[row][k]));
+        spread_lines(&mut lines, share);
+        for (k, line) in lines.iter().enumerate() {
+            for (row, patch) in rows.iter_mut().zip(line) {
+                row[k] = *patch;
+            }
+        }
     }
-    for j in 0..ACROSS {
-        let mut column: [f32; AHEAD] = core::array::from_fn(|i| patches[i][j]);
-        spread_line(&mut column, share);
-        for (row, patch) in patches.iter_mut().zip(column) {
-            row[j] = patch;
+    for first in (0..ACROSS).step_by(LINES) {
+        let mut lines: Lines<AHEAD> = core::array::from_fn(|i| core::array::from_fn(|line| patches[i][first + line]));
+        spread_lines(&mut lines, share);
+        for (row, line) in patches.iter_mut().zip(&lines) {
+            for (patch, value) in row.iter_mut().skip(first).zip(line) {
+                *patch = *value;
+            }
         }
     }
 }
 
-fn spread_line<const N: usize>(line: &mut [f32; N], share: f32) {
-    let mut before = [0.0; N];
-    let mut carried = 0.0;
-    for (before, own) in before.iter_mut().zip(&*line) {
+/// Rows or columns of patches that are worked on side by side: each step along one waits for the step before.
+const LINES: usize = 4;
+const _: () = assert!(AHEAD.is_multiple_of(LINES) && ACROSS.is_multiple_of(LINES), "no row or column is left over");
+
+type Lines<const N: usize> = [[f32; LINES]; N];
+
+fn spread_lines<const N: usize>(lines: &mut Lines<N>, share: f32) {
+    let mut before = [[0.0; LINES]; N];
+    let mut carried = [0.0; LINES];
+    for (before, own) in before.iter_mut().zip(&*lines) {
         *before = carried;
-        carried = share * (carried + own);
+        carried = core::array::from_fn(|line| share * (carried[line] + own[line]));
     }
-    let mut behind = 0.0;
-    for (patch, before) in line.iter_mut().rev().zip(before.iter().rev()) {
-        let own = *patch;
-        *patch = own + before + behind;
-        behind = share * (behind + own);
+    let mut behind = [0.0; LINES];
+    for (patches, before) in lines.iter_mut().rev().zip(before.iter().rev()) {
+        let own = *patches;
+        *patches = core::array::from_fn(|line| own[line] + before[line] + behind[line]);
+        behind = core::array::from_fn(|line| share * (behind[line] + own[line]));
     }
 }
 

@@ -4,14 +4,14 @@
 use super::{
     Cell, MapBuilder, MapSettings, ObstacleMap, View,
     builder::Evidence,
-    votes::{Collect, Common},
+    votes::{Collect, Common, TileRows},
 };
 use crate::{
     arch::{self, Chosen},
     bands::{Work, Workers, cut, run_all},
     disparity::DisparityPicture,
     ground::Terrain,
-    surfaces::{MAX_TILE_SURFACES, Surfaces, TILE},
+    surfaces::{MAX_TILE_SURFACES, Surfaces},
 };
 
 /// What the pixels of one band say.
@@ -56,7 +56,9 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
                 (evidence, common)
             });
             let works = core::iter::once(own).chain(others);
-            let jobs = cut(picture.height(), bands, TILE).zip(works).map(|(rows, (evidence, common))| CollectBand {
+            // Most of what votes lies in the lower rows, so that each band takes some of them.
+            let rows = (0..bands).map(|first| TileRows { first, every: bands });
+            let jobs = rows.zip(works).map(|(rows, (evidence, common))| CollectBand {
                 chosen,
                 settings,
                 obstacle_heights_m: heights,
@@ -111,7 +113,7 @@ struct CollectBand<'a, const PIXELS: usize, const SURFACES: usize, const DISPARI
     picture: DisparityPicture<'a>,
     view: &'a View<'a, DISPARITIES>,
     ground: &'a Terrain,
-    rows: core::ops::Range<usize>,
+    rows: TileRows,
 }
 
 impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Work
@@ -129,7 +131,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Work
             picture: *picture,
             view,
             ground,
-            rows: rows.clone(),
+            rows: *rows,
         };
         arch::compiled(*chosen, collect);
     }

@@ -2,7 +2,7 @@
 
 use super::{
     Cell, CellState, MapGeometry, MapSettings, ObstacleMap, UnknownReason, shadow, smear,
-    votes::{Collect, Common},
+    votes::{Collect, Common, TileRows},
 };
 use crate::{
     arch::{self, Chosen},
@@ -101,6 +101,11 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         self.chosen = chosen;
     }
 
+    /// The backend whose instructions are used.
+    pub(crate) const fn chosen(&self) -> Chosen {
+        self.chosen
+    }
+
     /// Fills `map`. Without a ground plane nothing is free, and obstacles are measured from the plane of the mount.
     pub fn run<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize>(
         &mut self,
@@ -116,7 +121,7 @@ impl<const CELLS: usize> MapBuilder<CELLS> {
         if (picture.width(), picture.height()) == surfaces.size() {
             let Self { settings, obstacle_heights_m, evidence, common, chosen } = self;
             let evidence = evidence.get_mut(..settings.geometry.len()).unwrap_or_default();
-            let (obstacle_heights_m, rows) = (*obstacle_heights_m, 0..picture.height());
+            let (obstacle_heights_m, rows) = (*obstacle_heights_m, TileRows::ALL);
             arch::compiled(
                 *chosen,
                 Collect { settings, obstacle_heights_m, evidence, common, surfaces, picture, view, ground, rows },

@@ -1,7 +1,5 @@
 //! The votes of the pixels, tile by tile, eight pixels side by side.
 
-use core::ops::Range;
-
 use super::{MapGeometry, MapSettings, View, builder::Evidence};
 use crate::{
     arch::Steps,
@@ -86,8 +84,25 @@ pub(super) struct Collect<'a, const PIXELS: usize, const SURFACES: usize, const 
     pub(super) picture: DisparityPicture<'a>,
     pub(super) view: &'a View<'a, DISPARITIES>,
     pub(super) ground: &'a Terrain,
-    /// Rows that are looked at: whole tiles.
-    pub(super) rows: Range<usize>,
+    /// The rows that are looked at.
+    pub(super) rows: TileRows,
+}
+
+/// Every so many rows of tiles, from one of them on.
+#[derive(Clone, Copy)]
+pub(super) struct TileRows {
+    pub(super) first: usize,
+    pub(super) every: usize,
+}
+
+impl TileRows {
+    pub(super) const ALL: Self = Self { first: 0, every: 1 };
+
+    /// First rows of pixels.
+    fn tops(self, height: usize) -> impl Iterator<Item = usize> {
+        let after = move |&y: &usize| Some(y.saturating_add(self.every.max(1).saturating_mul(TILE)));
+        core::iter::successors(Some(self.first.saturating_mul(TILE)), after).take_while(move |&y| y < height)
+    }
 }
 
 impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
@@ -95,7 +110,8 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
 {
     #[inline(always)]
     fn run(mut self) {
-        for y0 in self.rows.clone().step_by(TILE) {
+        let height = self.picture.height();
+        for y0 in self.rows.tops(height) {
             for x0 in (0..self.picture.width()).step_by(TILE) {
                 let found = self.surfaces.of_tile(x0, y0);
                 if found.is_empty() {
@@ -105,7 +121,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
                 for (common, surface) in self.common.iter_mut().zip(found) {
                     *common = Common::of(surface, self.ground);
                 }
-                for y in y0..y0.saturating_add(TILE).min(self.rows.end) {
+                for y in y0..y0.saturating_add(TILE).min(height) {
                     self.row(x0, y);
                 }
             }
@@ -115,7 +131,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Steps
 
 /// The rays of a row of a tile.
 struct Row {
-    /// Directions along x, y and z, and how fast they climb above the plane: each is the one before and a step.
+    /// Directions along x, y and z, and how fast they climb above the plane.
     rays: [[f32; TILE]; 4],
     camera_height_m: f32,
 }
@@ -142,12 +158,12 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
         let rise = |d: [f32; 3]| d[0] * plane.normal[0] + d[1] * plane.normal[1] + d[2] * plane.normal[2];
         let direction = rays.direction(x0 as f32, y as f32);
         let ([x, y, z], [dx, dy, dz]) = (direction, rays.along_row);
-        let (mut now, steps) = ([x, y, z, rise(direction)], [dx, dy, dz, rise(rays.along_row)]);
+        let (first, steps) = ([x, y, z, rise(direction)], [dx, dy, dz, rise(rays.along_row)]);
         let mut row = Row { rays: [[0.0; TILE]; 4], camera_height_m: plane.height_m(rays.origin_m) };
-        for k in 0..TILE {
-            for ((ray, now), step) in row.rays.iter_mut().zip(&mut now).zip(steps) {
-                ray[k] = *now;
-                *now += step;
+        // Each by itself: a sum that grows from pixel to pixel waits for the one before.
+        for ((ray, first), step) in row.rays.iter_mut().zip(first).zip(steps) {
+            for (ray, k) in ray.iter_mut().zip(0u16..) {
+                *ray = first + f32::from(k) * step;
             }
         }
         let mut noise_per_m2 = [0.0; TILE];
