@@ -76,18 +76,30 @@ pub(crate) fn run_all<W: Work>(
     workers: &mut impl Workers,
     works: impl Iterator<Item = W>,
 ) -> Vec<Ticket<W>, MAX_BANDS> {
-    let mut jobs: Vec<_, MAX_BANDS> = works.map(|work| Ticket { work, done: false }).take(MAX_BANDS).collect();
+    let mut jobs = collected(works.map(|work| Ticket { work, done: false }));
     workers.run(&mut jobs);
     jobs.iter_mut().for_each(Job::run);
     jobs
 }
 
+/// The first [`MAX_BANDS`] of `all`; there are no more.
+pub(crate) fn collected<T>(all: impl Iterator<Item = T>) -> Vec<T, MAX_BANDS> {
+    let mut kept = Vec::new();
+    for one in all {
+        if kept.push(one).is_err() {
+            break;
+        }
+    }
+    kept
+}
+
 /// Cuts `rows` into as many bands as are asked for, from the top, between multiples of `unit` rows. Where there are fewer units than
 /// bands, some bands are empty.
 pub(crate) fn cut(rows: usize, bands: usize, unit: usize) -> impl Iterator<Item = Range<usize>> + Clone {
-    let units = rows.div_ceil(unit.max(1));
-    let border = move |band: usize| (units * band / bands.max(1) * unit.max(1)).min(rows);
-    (0..bands).map(move |band| border(band)..border(band + 1))
+    // Rows of a picture and a few bands: no product is too large.
+    let units = rows.saturating_add(unit.saturating_sub(1)) / unit.max(1);
+    let border = move |band: usize| (units.saturating_mul(band) / bands.max(1)).saturating_mul(unit.max(1)).min(rows);
+    (0..bands).map(move |band| border(band)..border(band.saturating_add(1)))
 }
 
 #[cfg(test)]

@@ -193,7 +193,8 @@ impl<const WIDTH: usize> RowLooks<WIDTH> {
     pub(crate) fn begin_band(&mut self, whole: &Self, width: usize, first: usize) {
         self.choose(whole.chosen);
         self.begin(width, whole.height, whole.range);
-        self.next_strip = (0..STRIPS).filter(|&strip| strip_row(whole.height, strip) < first).count();
+        // Strips lie one below the other.
+        self.next_strip = (0..STRIPS).find(|&strip| strip_row(whole.height, strip) >= first).unwrap_or(STRIPS);
     }
 
     /// Adds what the rows of a band below said.
@@ -217,18 +218,19 @@ pub(crate) fn unit_of_bands(height: usize) -> usize {
     let rows = Profile::rows_of_band(height);
     match rows % BLOCK {
         0 => rows,
-        2 => 2 * rows,
-        _ => BLOCK * rows,
+        2 => rows.saturating_mul(2),
+        _ => rows.saturating_mul(BLOCK),
     }
 }
 
 /// Rows that a matcher which begins with a band needs above and below the rows `band`, so that the strips among them can be looked
 /// at; `reach` rows around a filtered one are needed for that.
 pub(crate) fn rows_around(height: usize, band: &Range<usize>, reach: usize) -> [usize; 2] {
-    let around = MARGIN + reach;
+    let around = MARGIN.saturating_add(reach);
     let strips = (0..STRIPS).map(|strip| strip_row(height, strip)).filter(|y| band.contains(y));
     strips.fold([0, 0], |[above, below], y| {
-        let lacking = [y - band.start, band.end - 1 - y].map(|there| around.saturating_sub(there));
+        let there = [y.saturating_sub(band.start), band.end.saturating_sub(1).saturating_sub(y)];
+        let lacking = there.map(|there| around.saturating_sub(there));
         [above.max(lacking[0]), below.max(lacking[1])]
     })
 }

@@ -41,7 +41,7 @@ impl Profile {
     /// Starts a picture of `height` rows.
     pub(super) fn begin(&mut self, height: usize) {
         self.rows_per_band = Self::rows_of_band(height);
-        self.bands = (height / self.rows_per_band).min(BANDS);
+        self.bands = (height / self.rows_per_band.max(1)).min(BANDS);
         self.grey.fill(0.0);
         self.contrast.fill(0.0);
     }
@@ -78,7 +78,7 @@ impl Profile {
 
     /// Rows of a band, before and after the first picture of a size.
     pub(super) fn rows_of_band(height: usize) -> usize {
-        height.div_ceil(BANDS).max(1)
+        (height.saturating_add(BANDS - 1) / BANDS).max(1)
     }
 
     /// Adds what was seen of other bands of the same picture: of each band one of the two knows nothing.

@@ -114,9 +114,10 @@ impl SparseMatches {
                 let _ = self.errors.push(error);
             }
         }
-        self.searches_left = self.searches_left.saturating_sub(SEARCHES - other.searches_left);
-        self.lower += other.lower;
-        self.near += other.near;
+        self.searches_left = self.searches_left.saturating_sub(SEARCHES.saturating_sub(other.searches_left));
+        // No more than there are places in the whole picture.
+        self.lower = self.lower.saturating_add(other.lower);
+        self.near = self.near.saturating_add(other.near);
     }
 
     /// Looks along the middle row of `strip`, whose disparities are `row`; `lower` if it lies in the lower half. `ordinals` are told
@@ -147,7 +148,7 @@ impl SparseMatches {
                 if let Some(ordinals) = ordinals.as_deref_mut().filter(|_| self.errors.len() > errors) {
                     let searched = searches_left > self.searches_left;
                     // Cannot fail: there is room for as many as for errors.
-                    let _ = ordinals.push(if searched { (SEARCHES - self.searches_left) as u8 } else { 0 });
+                    let _ = ordinals.push(if searched { SEARCHES.saturating_sub(self.searches_left) as u8 } else { 0 });
                 }
             }
         }

@@ -121,7 +121,8 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
     /// Adds what was seen of other rows of the same picture, from the first of a block on.
     pub(super) fn append(&mut self, other: &Self) {
         for (steps, other) in self.steps.as_flattened_mut().iter_mut().zip(other.steps.as_flattened()) {
-            *steps += other;
+            // Of each row of tiles, all was seen here or there: the sum fits as that of the whole picture does.
+            *steps = steps.wrapping_add(*other);
         }
         for (count, other) in self.counts.as_flattened_mut().iter_mut().zip(other.counts.as_flattened()) {
             *count = count.saturating_add(*other);

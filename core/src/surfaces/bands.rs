@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     arch::{self, Chosen, Steps},
-    bands::{MAX_BANDS, Work, Workers, cut, run_all},
+    bands::{MAX_BANDS, Work, Workers, collected, cut, run_all},
     disparity::{DisparityPicture, DisparityPixel},
     geometry::{DepthTable, Rays},
 };
@@ -34,15 +34,15 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
         }
         let found = self.label_in_bands(picture, depth, works, workers);
         let mut counts = found.iter();
-        let total: u32 = found.iter().sum();
+        let total = found.iter().fold(0u32, |total, &found| total.saturating_add(found));
         if total as usize > SURFACES {
             // The table has no room for all of them: which are left out is for all tiles together to say.
             arch::compiled(self.chosen, MeasureWhole { stage: self, picture, depth, rays });
-            return SurfaceReport { found: total, dropped: total - self.table.len() as u32 };
+            return SurfaceReport { found: total, dropped: total.saturating_sub(self.table.len() as u32) };
         }
-        let (across, down) = (self.width.div_ceil(TILE), self.height.div_ceil(TILE));
+        let (across, down) = (tiles_in(self.width), tiles_in(self.height));
         // Cannot fail: `configure` made sure that there is room for every tile, and surfaces were counted.
-        let _ = self.tiles.resize(across * down, 0);
+        let _ = self.tiles.resize(across.saturating_mul(down), 0);
         let _ = self.table.resize_default(total as usize);
         let chosen = self.chosen;
         let (mut tiles, mut table) = (self.tiles.as_mut_slice(), self.table.as_mut_slice());
@@ -53,10 +53,10 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             workers,
             parts.map(|part| {
                 let count = counts.next().map_or(0, |&count| count as usize);
-                let own_tiles = tiles.split_off_mut(..across * part.height.div_ceil(TILE)).unwrap_or_default();
+                let own_tiles = tiles.split_off_mut(..across.saturating_mul(tiles_in(part.height))).unwrap_or_default();
                 let surfaces = table.split_off_mut(..count).unwrap_or_default();
                 let slots = Slots { tiles: own_tiles, surfaces, before, tile: 0, len: 0 };
-                before += count;
+                before = before.saturating_add(count);
                 MeasureBand { chosen, pixels: rows_of(picture, &part), part, depth, rays, slots }
             }),
         );
@@ -82,8 +82,13 @@ impl<const PIXELS: usize, const SURFACES: usize> Surfaces<PIXELS, SURFACES> {
             covered: covered.clone(),
             found: 0,
         });
-        run_all(workers, bands).iter().map(|band| band.work.found).collect()
+        collected(run_all(workers, bands).iter().map(|band| band.work.found))
     }
+}
+
+/// Tiles that so many pixels reach into.
+const fn tiles_in(pixels: usize) -> usize {
+    pixels.saturating_add(TILE - 1) / TILE
 }
 
 /// The parts of a picture, one for each band.
@@ -95,11 +100,11 @@ fn parts<'a>(
     own: &'a mut TileWork,
     works: &'a mut [&mut TileWork],
 ) -> impl Iterator<Item = Part<'a>> {
-    let bands = (works.len() + 1).min(MAX_BANDS);
-    let mut rest = labels.get_mut(..width * height).unwrap_or_default();
+    let bands = works.len().saturating_add(1).min(MAX_BANDS);
+    let mut rest = labels.get_mut(..width.saturating_mul(height)).unwrap_or_default();
     let works = core::iter::once(own).chain(works.iter_mut().map(|work| &mut **work));
     cut(height, bands, TILE).zip(works).map(move |(rows, work)| {
-        let labels = rest.split_off_mut(..rows.len() * width).unwrap_or_default();
+        let labels = rest.split_off_mut(..rows.len().saturating_mul(width)).unwrap_or_default();
         let TileWork { union, moments, shifts } = work;
         Part { settings, limits, width, height: rows.len(), top: rows.start, labels, union, moments, shifts }
     })
@@ -107,8 +112,9 @@ fn parts<'a>(
 
 /// The pixels of a part.
 fn rows_of<'a>(picture: DisparityPicture<'a>, part: &Part<'_>) -> &'a [DisparityPixel] {
-    let first = part.top * part.width;
-    picture.pixels().get(first..first + part.height * part.width).unwrap_or_default()
+    let first = part.top.saturating_mul(part.width);
+    let end = first.saturating_add(part.height.saturating_mul(part.width));
+    picture.pixels().get(first..end).unwrap_or_default()
 }
 
 /// Numbers the surfaces of a band.
@@ -199,15 +205,15 @@ struct Slots<'a> {
 impl Table for Slots<'_> {
     fn begin_tile(&mut self) {
         if let Some(first) = self.tiles.get_mut(self.tile) {
-            *first = (self.before + self.len) as u16;
+            *first = self.before.saturating_add(self.len) as u16;
         }
-        self.tile += 1;
+        self.tile = self.tile.saturating_add(1);
     }
 
     fn push(&mut self, surface: Surface) -> bool {
         let Some(slot) = self.surfaces.get_mut(self.len) else { return false };
         *slot = surface;
-        self.len += 1;
+        self.len = self.len.saturating_add(1);
         true
     }
 }

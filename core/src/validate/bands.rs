@@ -27,11 +27,13 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         if self.settings.min_surface_px <= 1 || self.width == 0 {
             return;
         }
-        let height = picture.len() / self.width;
-        let bands = cut(height, stages.len() + 1, UNIT);
-        for seam in bands.clone().filter(|rows| !rows.is_empty()).map(|rows| rows.start).skip(1) {
-            self.settle_row(picture, seam - 1, None);
-            self.settle_row(picture, seam, Some(seam - 1));
+        let height = picture.len() / self.width.max(1);
+        let bands = cut(height, stages.len().saturating_add(1), UNIT);
+        for rows in bands.clone().filter(|rows| !rows.is_empty()) {
+            // The first band has no seam above it.
+            let (seam, Some(above)) = (rows.start, rows.start.checked_sub(1)) else { continue };
+            self.settle_row(picture, above, None);
+            self.settle_row(picture, seam, Some(above));
         }
         for stage in stages.iter_mut() {
             (stage.settings, stage.width, stage.chosen) = (self.settings, self.width, self.chosen);
@@ -40,7 +42,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         let mut rest = picture;
         let stages = core::iter::once(self).chain(stages.iter_mut().map(|stage| &mut **stage));
         let jobs = bands.zip(stages).map(|(rows, stage)| {
-            let picture = rest.split_off_mut(..rows.len() * width).unwrap_or_default();
+            let picture = rest.split_off_mut(..rows.len().saturating_mul(width)).unwrap_or_default();
             RowsOfBand { stage, picture, seams: [rows.start > 0, rows.end < height] }
         });
         run_all(workers, jobs);
@@ -53,15 +55,15 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
     fn settle_row(&mut self, picture: &mut [DisparityPixel], y: usize, settled: Option<usize>) {
         let (width, reach) = (self.width, self.settings.step_sixteenths);
         let steps_at =
-            |picture: &[DisparityPixel], x: usize, y: usize| picture.get(y * width + x).map_or(0, |p| p.steps());
+            |picture: &[DisparityPixel], x: usize, y: usize| picture.get(place_of(x, y, width)).map_or(0, |p| p.steps());
         let near = |a: u16, b: u16| a != 0 && b != 0 && a.abs_diff(b) <= reach;
         let mut start = 0;
         while start < width {
-            let mut end = start + 1;
-            while end < width && near(steps_at(picture, end - 1, y), steps_at(picture, end, y)) {
-                end += 1;
+            let (mut last, mut end) = (start, start.saturating_add(1));
+            while end < width && near(steps_at(picture, last, y), steps_at(picture, end, y)) {
+                (last, end) = (end, end.saturating_add(1));
             }
-            let large = end - start >= usize::from(self.settings.min_surface_px)
+            let large = end.saturating_sub(start) >= usize::from(self.settings.min_surface_px)
                 || settled.is_some_and(|above| {
                     (start..end).any(|x| near(steps_at(picture, x, above), steps_at(picture, x, y)))
                 });
@@ -81,7 +83,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         walk.clear();
         let mut visit = |walk: &mut Vec<Step, MAX_SURFACE_PX>, x: u16, y: u16, from: Option<u16>| {
             let (column, row) = (usize::from(x), usize::from(y));
-            let Some(pixel) = picture.get_mut(row * width + column).filter(|_| column < width) else { return };
+            let Some(pixel) = picture.get_mut(place_of(column, row, width)).filter(|_| column < width) else { return };
             let steps = pixel.steps();
             if steps != 0
                 && from.is_none_or(|from| steps.abs_diff(from) <= reach)
@@ -94,7 +96,7 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         let mut next = 0;
         // All that was visited is kept, to be put back.
         while let Some(&Step { x, y, steps }) = walk.get(next).filter(|_| walk.len() < enough) {
-            next += 1;
+            next = next.saturating_add(1);
             visit(walk, x.saturating_add(1), y, Some(steps));
             visit(walk, x, y.saturating_add(1), Some(steps));
             if let Some(x) = x.checked_sub(1) {
@@ -106,12 +108,17 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
         }
         if walk.len() >= enough {
             for &Step { x, y, steps } in walk.iter() {
-                if let Some(pixel) = picture.get_mut(usize::from(y) * width + usize::from(x)) {
+                if let Some(pixel) = picture.get_mut(place_of(usize::from(x), usize::from(y), width)) {
                     *pixel = DisparityPixel::from_steps(steps);
                 }
             }
         }
     }
+}
+
+/// Place of a pixel in a picture of rows of `width`.
+const fn place_of(x: usize, y: usize, width: usize) -> usize {
+    y.saturating_mul(width).saturating_add(x)
 }
 
 /// The rows of a band, whose surfaces at a seam are settled.

@@ -6,7 +6,7 @@ use heapless::Vec;
 
 use super::{DetectError, Detection, Detector, Probe, Stage, interpreter::Hands};
 use crate::{
-    bands::{MAX_BANDS, Workers, cut, run_all},
+    bands::{MAX_BANDS, Workers, collected, cut, run_all},
     disparity::DisparityPicture,
     geometry::{DepthTable, Rays},
     ground::Terrain,
@@ -85,7 +85,8 @@ impl<
     ) -> Result<&Detection<OBSTACLES, CELLS>, DetectError> {
         let setup = self.begin(left, right)?;
         let (width, height) = (setup.pair.width as usize, setup.pair.height as usize);
-        let (bands, _) = bands.split_at_mut(bands.len().min(MAX_BANDS - 1));
+        let others = bands.len().min(MAX_BANDS - 1);
+        let bands = bands.get_mut(..others).unwrap_or_default();
 
         probe.enter(Stage::Match);
         let exposures = self.match_bands([left, right], (width, height), bands, workers);
@@ -93,7 +94,7 @@ impl<
         probe.enter(Stage::Validate);
         let disparity = self.disparity.get_mut(..width.saturating_mul(height)).unwrap_or_default();
         {
-            let mut stages: Vec<_, MAX_BANDS> = bands.iter_mut().map(|band| &mut band.surface_size).collect();
+            let mut stages = collected(bands.iter_mut().map(|band| &mut band.surface_size));
             self.surface_size.run_in_bands(disparity, &mut stages, workers);
         }
 
@@ -116,7 +117,8 @@ impl<
         for band in bands.iter_mut() {
             band.matcher.configure_as(&self.matcher);
         }
-        let all = cut(height, bands.len() + 1, unit_of_bands(height));
+        let count = bands.len().saturating_add(1);
+        let all = cut(height, count, unit_of_bands(height));
         for (band, rows) in bands.iter_mut().zip(all.clone().skip(1)) {
             band.looks.begin_band(&self.content.looks, width, rows.start);
             band.ordinals.clear();
@@ -129,17 +131,17 @@ impl<
             (rows, matcher, looks, Some(ordinals))
         });
         let mut rest = disparity.get_mut(..width.saturating_mul(height)).unwrap_or_default();
-        let count = all.clone().count();
-        let jobs = all.enumerate().zip(core::iter::once(own).chain(others)).map(|((index, rows), room)| {
+        let rooms = (0..count).zip(core::iter::once(own).chain(others));
+        let jobs = all.zip(rooms).map(|(rows, (index, room))| {
             let (pair, matcher, looks, ordinals) = room;
             let rows = BandRows::new(rows, height, matcher.settings());
-            let disparity = rest.split_off_mut(..rows.out.len() * width).unwrap_or_default();
+            let disparity = rest.split_off_mut(..rows.out.len().saturating_mul(width)).unwrap_or_default();
             // The first band sees to how the left picture is exposed, the last one to the right one.
-            let exposed = [0, count - 1].map(|band| (band == index).then_some(Exposure::default()));
+            let exposed = [0, count.saturating_sub(1)].map(|band| (band == index).then_some(Exposure::default()));
             MatchBand { rectifier, pictures, pair, matcher, looks, ordinals, rows, width, disparity, exposed }
         });
         let mut exposed = [Exposure::default(); 2];
-        for done in run_all(workers, jobs) {
+        for done in run_all(workers, jobs).iter() {
             for (exposed, seen) in exposed.iter_mut().zip(done.work.exposed) {
                 *exposed = seen.unwrap_or(*exposed);
             }
@@ -168,7 +170,7 @@ impl<W: Workers, const WIDTH: usize, const BAND_DISPARITIES: usize, const CELLS:
         depth: &DepthTable<DISPARITIES>,
         rays: &Rays,
     ) -> SurfaceReport {
-        let mut works: Vec<_, MAX_BANDS> = self.bands.iter_mut().map(|band| &mut band.tiles).collect();
+        let mut works = collected(self.bands.iter_mut().map(|band| &mut band.tiles));
         surfaces.run_in_bands(picture, depth, rays, &mut works, self.workers)
     }
 
@@ -182,7 +184,7 @@ impl<W: Workers, const WIDTH: usize, const BAND_DISPARITIES: usize, const CELLS:
         ground_seen: bool,
         map: &mut ObstacleMap<CELLS>,
     ) {
-        let mut votes: Vec<_, MAX_BANDS> = self.bands.iter_mut().map(|band| &mut band.votes).collect();
+        let mut votes = collected(self.bands.iter_mut().map(|band| &mut band.votes));
         builder.run_in_bands(surfaces, picture, view, terrain, ground_seen, map, &mut votes, self.workers);
     }
 }

@@ -25,7 +25,7 @@ impl BandRows {
         let [_, margin] = settings.margins();
         let around = rows_around(height, &out, settings.reach());
         let [above, below] = around.map(|rows| rows.max(margin));
-        let seen = out.start.saturating_sub(above)..(out.end + below).min(height);
+        let seen = out.start.saturating_sub(above)..out.end.saturating_add(below).min(height);
         Self { seen: if out.is_empty() { out.clone() } else { seen }, out }
     }
 }
@@ -70,12 +70,11 @@ impl<const WIDTH: usize, const DISPARITIES: usize, const GRID: usize> Work for M
             let right_span = rectifier.row(Side::Right, pictures[1], y, right_row);
             let spans = [ValidSpan::from(left_span), ValidSpan::from(right_span)];
             matcher.push(left_row, right_row, spans[0], spans[1]);
-            let place = |next: usize| (next - out.start) * width..(next + 1 - out.start) * width;
-            while let Some(out) = disparity.get_mut(place(next)) {
-                if !matcher.pull(next - seen.start, out) {
+            while let Some(row) = row_of(disparity, next.saturating_sub(out.start), width) {
+                if !matcher.pull(next.saturating_sub(seen.start), row) {
                     break;
                 }
-                next += 1;
+                next = next.saturating_add(1);
             }
             if out.contains(&y) {
                 looks.push(y, [left_row, right_row], spans);
@@ -83,4 +82,10 @@ impl<const WIDTH: usize, const DISPARITIES: usize, const GRID: usize> Work for M
             looks.look((matcher, seen.start), (disparity, out.start), width, next, ordinals.as_deref_mut());
         }
     }
+}
+
+/// Row `y` of a picture of rows of `width`.
+fn row_of(picture: &mut [DisparityPixel], y: usize, width: usize) -> Option<&mut [DisparityPixel]> {
+    let start = y.saturating_mul(width);
+    picture.get_mut(start..start.saturating_add(width))
 }
