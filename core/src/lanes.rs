@@ -1,5 +1,9 @@
 //! Arithmetic that the compiler makes vector instructions of.
 
+/// Pixels that floating-point work is done for side by side. A Cortex-M has no vectors of floating-point numbers: there each pixel goes
+/// by itself, and those that say nothing are passed over.
+pub(crate) const LANES: usize = if cfg!(target_arch = "arm") { 1 } else { 8 };
+
 /// Adding this to a number below 2^22 leaves its nearest whole number in the lowest bits.
 const ROUNDING: f32 = (3 << 22) as f32;
 

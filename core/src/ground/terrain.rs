@@ -5,7 +5,7 @@ use crate::{
     arch::{self, Chosen, Steps},
     disparity::DisparityPicture,
     geometry::{DepthTable, Rays},
-    lanes::floor,
+    lanes::{LANES, floor},
     surfaces::{MAX_TILE_SURFACES, SurfaceClass, Surfaces, TILE},
     work::{self, Loop},
 };
@@ -17,9 +17,6 @@ const ACROSS: usize = 40;
 /// Of so many pixels along and across the rows one is looked at.
 const STEP_X: usize = 4;
 const STEP_Y: usize = 2;
-
-/// Points that are worked on side by side.
-const LANES: usize = 8;
 
 const _: () = assert!(TILE.is_multiple_of(STEP_X), "the first pixel of a tile is one that is looked at");
 
@@ -436,7 +433,7 @@ fn spread(patches: &mut [[f32; ACROSS]; AHEAD], share: f32) {
 }
 
 /// Rows or columns of patches that are worked on side by side: each step along one waits for the step before.
-const LINES: usize = 4;
+const LINES: usize = LANES.div_ceil(2);
 const _: () = assert!(AHEAD.is_multiple_of(LINES) && ACROSS.is_multiple_of(LINES), "no row or column is left over");
 
 type Lines<const N: usize> = [[f32; LINES]; N];

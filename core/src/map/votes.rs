@@ -5,16 +5,13 @@ use crate::{
     arch::Steps,
     disparity::DisparityPicture,
     ground::Terrain,
-    lanes::floor,
+    lanes::{LANES, floor},
     links::{PIECE, Piece, changes, each_bit},
     surfaces::{MAX_TILE_SURFACES, Surface, SurfaceClass, Surfaces, TILE},
     work::{self, Loop},
 };
 
 const _: () = assert!(TILE == PIECE, "a row of a tile is one piece");
-
-/// Pixels that are worked on side by side.
-const LANES: usize = 8;
 
 /// Distance over which the slope of the ground is measured, metres.
 const SLOPE_STEP_M: f32 = 1.5;
@@ -227,6 +224,9 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
             return;
         };
         let [known, is_ground, is_obstacle] = [roles.any, roles.ground, roles.obstacle].map(|bits| bits >> first);
+        if known & ((1 << LANES) - 1) == 0 {
+            return;
+        }
         let [ray_x, ray_y, _, climb] = &row.rays;
         let (Some(ray_x), Some(ray_y), Some(climb)) = (group(ray_x, first), group(ray_y, first), group(climb, first))
         else {

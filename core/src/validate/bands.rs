@@ -54,8 +54,9 @@ impl<const WIDTH: usize> SurfaceSize<WIDTH> {
     /// For each run of the row as many pixels as the smallest surface that is kept has.
     fn settle_row(&mut self, picture: &mut [DisparityPixel], y: usize, settled: Option<usize>) {
         let (width, reach) = (self.width, self.settings.step_sixteenths);
-        let steps_at =
-            |picture: &[DisparityPixel], x: usize, y: usize| picture.get(place_of(x, y, width)).map_or(0, |p| p.steps());
+        let steps_at = |picture: &[DisparityPixel], x: usize, y: usize| {
+            picture.get(place_of(x, y, width)).map_or(0, |p| p.steps())
+        };
         let near = |a: u16, b: u16| a != 0 && b != 0 && a.abs_diff(b) <= reach;
         let mut start = 0;
         while start < width {
