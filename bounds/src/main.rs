@@ -9,9 +9,6 @@ mod latency;
 mod memory;
 mod painted;
 mod report;
-#[cfg(feature = "search")]
-mod search;
-mod work;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -19,6 +16,9 @@ use std::{path::PathBuf, process::ExitCode};
 use anyhow::Context;
 use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
+#[cfg(feature = "search")]
+use fencepost_work::search;
+use fencepost_work::work;
 
 use figures::Figures;
 

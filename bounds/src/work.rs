@@ -9,30 +9,37 @@ use fencepost_core::{
 
 /// What decides the bounds.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape {
-    pub(crate) width: u64,
-    pub(crate) height: u64,
-    pub(crate) disparities: u64,
+pub struct Shape {
+    /// Of a picture, px.
+    pub width: u64,
+    /// Of a picture, px.
+    pub height: u64,
+    /// Disparities that are searched.
+    pub disparities: u64,
     /// Capacity of the table of surfaces.
-    pub(crate) surfaces: u64,
+    pub surfaces: u64,
     /// Capacity of the table of obstacles.
-    pub(crate) obstacles: u64,
-    pub(crate) settings: Settings,
+    pub obstacles: u64,
+    /// Settings of all stages.
+    pub settings: Settings,
     /// Runs of cells that a scan can hold.
-    pub(crate) wire_runs: u64,
+    pub wire_runs: u64,
     /// Frames of a scan.
-    pub(crate) wire_frames: u64,
+    pub wire_frames: u64,
 }
 
 /// The bound of a stage: its loops, and what all of them can take together. That may be less than the sum, as not all can take the
 /// most at the same time.
 #[derive(Clone, Debug)]
-pub(crate) struct StageWork {
-    pub(crate) stage: &'static str,
-    pub(crate) loops: Vec<(&'static str, u64)>,
-    pub(crate) total: u64,
+pub struct StageWork {
+    /// Its name.
+    pub stage: &'static str,
+    /// The most steps of each of its loops.
+    pub loops: Vec<(&'static str, u64)>,
+    /// The most steps of all of them together.
+    pub total: u64,
     /// The total, as it is written on paper.
-    pub(crate) formula: &'static str,
+    pub formula: &'static str,
 }
 
 /// Edge of a tile, px.
@@ -59,7 +66,7 @@ const ROWS_COMPARED: u64 = 9;
 
 impl Shape {
     /// The default settings with the capacities of [`Capacities::for_pictures`].
-    pub(crate) fn of(width: usize, height: usize, disparities: usize) -> Self {
+    pub fn of(width: usize, height: usize, disparities: usize) -> Self {
         let capacities = Capacities::for_pictures(width, height, disparities);
         let mut settings = Settings::default();
         settings.matching.disparities = disparities as u16;
@@ -95,7 +102,7 @@ impl Shape {
     }
 
     /// All stages, in the order of the data.
-    pub(crate) fn stages(&self) -> Vec<StageWork> {
+    pub fn stages(&self) -> Vec<StageWork> {
         vec![
             self.rectify(),
             self.matching(),

@@ -1,5 +1,6 @@
 //! The search for the worst: hill climbing over what the pictures are made of, against the bounds of `work`.
 
+mod attack;
 mod genome;
 mod rig;
 
@@ -13,6 +14,7 @@ use fencepost_core::work::LOOPS;
 use serde::{Deserialize, Serialize};
 
 use crate::work::{Shape, StageWork};
+pub use attack::{Attack, Outcome};
 use genome::{Genome, Random};
 use rig::{Rig, Robot, Small, Taken};
 
@@ -21,18 +23,22 @@ const NEAR_PERCENT: f64 = 90.0;
 
 /// The worst that was found, by stage; kept as a regression.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Worst(BTreeMap<String, Vec<Genome>>);
+pub struct Worst(BTreeMap<String, Vec<Genome>>);
 
 impl Worst {
     /// # Errors
     /// The file cannot be read or is none of these.
-    pub(crate) fn read(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("cannot read {}: run from the root of the repository", path.display()))?;
         toml::from_str(&text).with_context(|| format!("{} cannot be used", path.display()))
     }
 
-    pub(crate) fn to_toml(&self) -> Result<String> {
+    /// The text of such a file.
+    ///
+    /// # Errors
+    /// It cannot be written as TOML.
+    pub fn to_toml(&self) -> Result<String> {
         let head = "# The pictures that cost the most of all that were tried, for each stage: numbers that they are made of.\n\
                     # `fencepost-bounds search` runs them; with --rounds it goes on from them, and --write keeps what it finds.\n\n";
         Ok(head.to_owned() + &toml::to_string(self).context("it cannot be written")?)
@@ -41,7 +47,7 @@ impl Worst {
 
 /// Runs what is kept and goes on from it for `rounds` rounds for each stage; returns what to print, whether it is as it must be, and
 /// the worst that was found. Every picture that is tried is held against the bounds, not only those that are kept.
-pub(crate) fn search(kept: &Worst, rounds: usize, seed: u32, only: Option<&str>) -> (String, bool, Worst) {
+pub fn search(kept: &Worst, rounds: usize, seed: u32, only: Option<&str>) -> (String, bool, Worst) {
     let (mut text, mut good, mut worst) = (String::new(), true, Worst::default());
     let mut rigs: [Box<dyn Rig>; 2] = [Box::new(Small::new()), Box::new(Robot::new())];
     let [small, robot] = rigs.each_ref().map(|rig| rig.shape().stages());
@@ -171,7 +177,7 @@ mod tests {
     use super::*;
 
     /// Counts are those of the whole program: one test at a time.
-    static ONE: std::sync::Mutex<()> = std::sync::Mutex::new(());
+    pub(super) static ONE: std::sync::Mutex<()> = std::sync::Mutex::new(());
 
     #[test]
     fn a_step_more_than_the_bound_is_told_by_name() {
