@@ -1,3 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| fencepost_invariants::run("surfaces", bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| fencepost_invariants::surfaces(bytes));

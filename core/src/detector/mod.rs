@@ -14,7 +14,7 @@ pub use memory::{Capacities, MemoryPart, band_bytes, memory_bytes};
 pub use stage::{Probe, Stage};
 
 use crate::{
-    arch::{Backend, Chosen},
+    arch::Backend,
     disparity::{DisparityPicture, DisparityPixel, Reason},
     error::ConfigError,
     geometry::{Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
@@ -149,7 +149,7 @@ impl<
             sector_width_deg: settings.map.sector_width_deg,
         };
         self.interpreter.configure(settings, &setup, mount.height_m.is_some())?;
-        let chosen = Chosen::new(self.matcher.backend()).unwrap_or(Chosen::PLAIN);
+        let chosen = self.matcher.chosen();
         self.rectifier.choose(chosen);
         self.surface_size.choose(chosen);
         self.content.choose(chosen);

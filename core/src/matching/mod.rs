@@ -20,7 +20,7 @@ pub use settings::{MatchCost, MatchSettings, Prefilter};
 pub(crate) use strip::Strip;
 
 use crate::{
-    arch::{self, Backend, CHUNK, CostJob, Decide, Found, KeyJob, KeyLimits, Search, Sums},
+    arch::{self, Backend, CHUNK, Chosen, CostJob, Decide, Found, KeyJob, KeyLimits, Search, Sums},
     disparity::{DisparityPixel, Reason},
     error::{ConfigError, ConfigProblem},
     work::{self, Loop},
@@ -94,6 +94,11 @@ impl<const WIDTH: usize, const DISPARITIES: usize> Matcher<WIDTH, DISPARITIES> {
     /// with fewer places, and plain Rust for absolute differences.
     pub const fn backend(&self) -> Backend {
         self.plan.chosen.backend()
+    }
+
+    /// The same, as what shows that the processor has its instructions.
+    pub(crate) const fn chosen(&self) -> Chosen {
+        self.plan.chosen
     }
 
     /// Takes settings and the size of the rectified pictures.

@@ -61,8 +61,8 @@ impl Lens {
     pub(super) fn undistort(&self, point: [f32; 2]) -> Option<[f32; 2]> {
         let mut ray = [0.0, 0.0];
         let mut residual = [f32::MAX; 2];
+        let mut image = self.image(ray)?;
         for _ in 0..NEWTON_STEPS {
-            let image = self.image(ray)?;
             residual = [point[0] - image.point[0], point[1] - image.point[1]];
             let [[a, b], [c, d]] = image.jacobian;
             let step = [
@@ -73,15 +73,20 @@ impl Lens {
             let mut length = 1.0;
             let reached = loop {
                 let candidate = [ray[0] + length * step[0], ray[1] + length * step[1]];
-                if self.image(candidate).is_some() {
-                    break candidate;
+                if let Some(image) = self.image(candidate) {
+                    break (candidate, image);
                 }
                 length *= 0.5;
                 if length < 1.0e-3 {
                     return None;
                 }
             };
-            ray = reached;
+            let is_there = ray == reached.0;
+            (ray, image) = reached;
+            // From here on every step would be the same.
+            if is_there {
+                break;
+            }
         }
         (residual[0].abs().max(residual[1].abs()) < 1.0e-4).then_some(ray)
     }

@@ -19,7 +19,8 @@ const NAMES: [[&str; 2]; 4] = [
 /// Stands between the texts of two files.
 const BETWEEN: char = '\u{1e}';
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     let Some((&first, text)) = bytes.split_first() else { return };
     let Ok(text) = std::str::from_utf8(text) else { return };
     let names = NAMES[usize::from(first) % NAMES.len()];

@@ -50,10 +50,7 @@ pub(crate) struct Camera {
 impl Camera {
     /// Of any bytes. Nearly all of them can be used.
     pub(crate) fn read(source: &mut Source<'_>) -> Self {
-        // Sizes around those of a tile as often as any others.
-        let (any_width, any_height) = (17 + source.below(24), 17 + source.below(20));
-        let width = source.one_of(&[16, 16, 20, 24, 33, 40, any_width]);
-        let height = source.one_of(&[16, 16, 18, 20, 33, 36, any_height]);
+        let (width, height) = size(source);
         let focal_px = source.within(12.0, 60.0);
         let pair = RectifiedPair {
             width: width as u32,
@@ -105,6 +102,32 @@ impl Camera {
     /// Number of pixels.
     pub(crate) const fn pixels(&self) -> usize {
         (self.pair.width * self.pair.height) as usize
+    }
+}
+
+/// Width and height of pictures, px: mostly the smallest, or as small with a border of tiles across them or down, so that an execution
+/// is short; two borders that cross each other, and any others, now and then.
+fn size(source: &mut Source<'_>) -> (usize, usize) {
+    let any = (17 + source.below(24), 17 + source.below(20));
+    let (which, height) = (source.byte(), source.one_of(&[16, 16, 18, 20, 33, 36, any.1]));
+    match which {
+        0..14 => ([16, 16, 20, 24, 33, 40, any.0][usize::from(which % 7)], height),
+        14..60 => (TILE + 1, 16),
+        60..106 => (16, TILE + 1),
+        106..224 => (16, 16),
+        224..236 => (TILE + 1, TILE + 1),
+        236..248 => any,
+        248.. => (WIDTH, HEIGHT),
+    }
+}
+
+/// How many frames a detector sees: mostly one.
+pub(crate) fn frames(source: &mut Source<'_>) -> usize {
+    match source.byte() {
+        0..160 => 1,
+        160..224 => 2,
+        224..248 => 3,
+        248.. => 4,
     }
 }
 

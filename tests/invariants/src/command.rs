@@ -13,7 +13,8 @@ use crate::{
 
 const TIMEOUT_NS: u64 = 100_000_000;
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     let mut source = Source::new(bytes);
     let base = BaseId::new(u16::from(source.byte() % 7 + 1) * 0x100).unwrap_or(BaseId::DEFAULT);
     let node = NodeId::new(source.byte() % 16).unwrap_or_default();

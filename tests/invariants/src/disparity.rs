@@ -11,7 +11,7 @@ use fencepost_core::{
 
 use crate::{
     Source,
-    camera::{Camera, Two, draw},
+    camera::{Camera, Two, draw, frames},
     detection::{Found, assert_same, check},
 };
 
@@ -25,7 +25,8 @@ thread_local! {
         RefCell::new(Box::new(Detectors { two: Two::new(), pixels: Vec::new() }));
 }
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     DETECTORS.with_borrow_mut(|detectors| detectors.check(&mut Source::new(bytes)));
 }
 
@@ -34,8 +35,8 @@ impl Detectors {
         let Self { two, pixels } = self;
         two.choose(source);
         let Two { first, second, .. } = two;
-        let frames = 1 + source.below(3);
-        let twice = source.below(4) == 0;
+        let frames = frames(source);
+        let twice = source.below(16) == 0;
         let camera = Camera::read(source);
         let calibration = StereoCalibration::Rectified(camera.pair);
         let configured = first.configure(&camera.settings, &calibration, &camera.mount);
@@ -65,7 +66,7 @@ impl Detectors {
             } else if frame + 1 < frames && source.below(8) == 7 {
                 before = Some(first.detection().clone());
             }
-            same_alone &= frame + 1 < frames || source.below(4) == 0;
+            same_alone &= frame + 1 < frames || source.below(8) == 0;
         }
         // Where nothing is held, no frame has a say in the next.
         if same_alone {

@@ -27,8 +27,25 @@ mod seeds;
 mod source;
 mod surfaces;
 
+// Each target as a function of its own: a fuzzer has only the code, and the counters, of what its target leads to.
+#[cfg(feature = "host")]
+pub use calibration::run as calibration;
+pub use command::run as command;
+pub use disparity::run as disparity;
+#[cfg(feature = "host")]
+pub use live::run as live;
+pub use pairs::run as pairs;
+#[cfg(feature = "host")]
+pub use pixels::run as pixels;
+pub use receiver::run as receiver;
+#[cfg(feature = "host")]
+pub use recording::run as recording;
+pub use rectifier::run as rectifier;
+#[cfg(feature = "host")]
+pub use rig::run as rig;
 pub use seeds::seeds;
 pub use source::Source;
+pub use surfaces::run as surfaces;
 
 /// One way in.
 #[derive(Clone, Copy, Debug)]

@@ -85,7 +85,8 @@ impl Camera for Scheduled {
     }
 }
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let mut source = Source::new(bytes);
     let options = options();

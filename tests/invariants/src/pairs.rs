@@ -11,7 +11,7 @@ use fencepost_core::{
 
 use crate::{
     Source,
-    camera::{Camera, Small, Two},
+    camera::{Camera, Small, Two, frames},
     detection::{assert_found_same, assert_same, check},
 };
 
@@ -25,7 +25,8 @@ thread_local! {
         RefCell::new(Box::new(Detectors { two: Two::new(), pictures: Default::default() }));
 }
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     DETECTORS.with_borrow_mut(|detectors| detectors.check(&mut Source::new(bytes)));
 }
 
@@ -34,9 +35,9 @@ impl Detectors {
         let Self { two, pictures } = self;
         two.choose(source);
         let Two { first, second, .. } = two;
-        let frames = 1 + source.below(4);
-        let twice = source.below(4) == 0;
-        let alone = source.below(4) == 0;
+        let frames = frames(source);
+        let twice = source.below(16) == 0;
+        let alone = source.below(16) == 0;
         let camera = Camera::read(source);
         let size = (camera.pair.width as usize, camera.pair.height as usize);
         let calibration = StereoCalibration::Rectified(camera.pair);

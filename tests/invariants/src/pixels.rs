@@ -28,7 +28,8 @@ fn expect_panics_of_the_decoder() {
     });
 }
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     expect_panics_of_the_decoder();
     let mut source = Source::new(bytes);
     let format = source.one_of(&PixelFormat::ALL);

@@ -26,7 +26,8 @@ type Receiver = ScanReceiver<ROOM>;
 /// Frames of the longest scan that is sent here.
 type Frames = heapless::Vec<Frame, 32>;
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     let mut source = Source::new(bytes);
     let settings = WireSettings {
         base_id: u16::from(source.byte() % 7 + 1) * 0x100,

@@ -138,7 +138,8 @@ fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     let mut source = Source::new(bytes);
     let which = source.byte();
     if which % 17 == 16 {

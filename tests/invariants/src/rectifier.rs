@@ -21,7 +21,8 @@ thread_local! {
 
 type Matrix = [[f32; 3]; 3];
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     let mut source = Source::new(bytes);
     let raw = raw_pair(&mut source);
     RECTIFIERS.with_borrow_mut(|[rectifier, again]| {

@@ -10,7 +10,8 @@ thread_local! {
     static FOLDER: RefCell<Option<tempfile::TempDir>> = const { RefCell::new(None) };
 }
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     let Some((first, text)) = bytes.split_first() else { return };
     FOLDER.with_borrow_mut(|folder| {
         let folder = folder.get_or_insert_with(|| {

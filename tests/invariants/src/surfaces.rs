@@ -35,12 +35,21 @@ thread_local! {
     }));
 }
 
-pub(crate) fn run(bytes: &[u8]) {
+/// Runs one input.
+pub fn run(bytes: &[u8]) {
     let mut source = Source::new(bytes);
-    let camera = Camera::read(&mut source);
+    let mut camera = Camera::read(&mut source);
     if camera.pair.check().is_err() {
         return;
     }
+    // Mostly a strip with a border of tiles across it: so few pixels are soon gone through, and the fewer the more executions.
+    let (length, breadth) = ((TILE + 1 + source.below(3)) as u32, 1 + source.below(6) as u32);
+    let size = match source.byte() {
+        0..100 => (length, breadth),
+        100..200 => (breadth, length),
+        200.. => (camera.pair.width, camera.pair.height),
+    };
+    (camera.pair.width, camera.pair.height) = size;
     let Ok(frame) = VehicleFrame::new(&camera.mount.without_place()) else { return };
     STAGES.with_borrow_mut(|stages| stages.check(&mut source, &camera, &frame));
 }
@@ -100,8 +109,9 @@ impl Stages {
             sums.check(surface);
         }
 
-        // Joined over the whole picture: all of them, and those of one class.
-        for only in [None, Some(SurfaceClass::Vertical)] {
+        // Joined over the whole picture: all of them, or those of one class.
+        const CHOICES: [Option<SurfaceClass>; 2] = [None, Some(SurfaceClass::Vertical)];
+        for only in source.one_of(&[&CHOICES[..1], &CHOICES[1..], &CHOICES]) {
             let takes_part = |surface: &Surface| only.is_none_or(|class| surface.class == class);
             regions.join(surfaces, picture, takes_part);
             let table = surfaces.table();
