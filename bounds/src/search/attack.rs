@@ -107,12 +107,8 @@ mod tests {
         let mut attack = Attack::new();
         let inputs = attack.inputs(&worst);
         let near = |outcome: &Outcome| outcome.steps[0].0 * 100 >= outcome.steps[0].1 * 90;
-        let stages: std::collections::BTreeSet<usize> = inputs
-            .iter()
-            .map(|input| attack.run(input))
-            .filter(near)
-            .map(|outcome| outcome.stage)
-            .collect();
+        let stages: std::collections::BTreeSet<usize> =
+            inputs.iter().map(|input| attack.run(input)).filter(near).map(|outcome| outcome.stage).collect();
         assert_eq!(stages, (0..attack.works.len()).collect(), "stages that come near to their bound");
     }
 

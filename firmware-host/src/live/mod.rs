@@ -136,7 +136,7 @@ where
     let threads = pairs.len() + 1;
     let threads_per_pair = usize::from(settings.threads_per_pair);
     let start = Barrier::new(threads + 1);
-    let called_off = AtomicBool::new(false);
+    let (called_off, bus_ended) = (AtomicBool::new(false), AtomicBool::new(false));
     let (ready_sender, ready) = mpsc::channel();
 
     thread::scope(|scope| {
@@ -179,10 +179,14 @@ where
             // Before the detectors: a heartbeat must not wait for a picture. A FIFO thread is not interrupted by its equals.
             let wishes = ThreadWishes { cpu: settings.bus_cpu, priority: settings.bus_priority() };
             let (ready, start, called_off) = (ready_sender, &start, &called_off);
+            let (bus_ended, main) = (&bus_ended, thread::current());
             scope.spawn(move || {
                 let _ = ready.send(Ok(wishes.ask()));
                 start.wait();
-                (!called_off.load(Ordering::Relaxed)).then(|| bus_loop.run())
+                let report = (!called_off.load(Ordering::Relaxed)).then(|| bus_loop.run());
+                bus_ended.store(true, Ordering::Release);
+                main.unpark();
+                report
             })
         };
 
@@ -209,8 +213,9 @@ where
         observe(Observation::Started);
         let mut liveness = Liveness::new(places.iter().map(|place| &place.alive).zip(patience), &bus_alive);
         let mut broken = None;
-        while !bus_thread.is_finished() {
-            thread::sleep(LOOK);
+        while !bus_ended.load(Ordering::Acquire) && !bus_thread.is_finished() {
+            // The bus thread ends it when it is through.
+            thread::park_timeout(LOOK);
             while let Some(event) = events.next() {
                 observe(Observation::Event(&event));
             }

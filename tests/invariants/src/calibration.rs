@@ -33,18 +33,17 @@ pub fn run(bytes: &[u8]) {
         _ => Some((752, 480)),
     };
     let found = Calibration::parse(&sources, pictures);
-    match (&found, Calibration::parse(&sources, pictures)) {
-        (Ok(found), Ok(again)) => {
-            // A debug text compares what is not a number, too.
-            assert_eq!(format!("{found:?}"), format!("{again:?}"), "the same text again");
-            check(found, pictures);
-        }
-        (Err(found), Err(again)) => {
-            assert_eq!(format!("{found:?}"), format!("{again:?}"), "the same text again");
-            let text = found.to_string();
+    match &found {
+        Ok(found) => check(found, pictures),
+        Err(error) => {
+            let text = error.to_string();
             assert!(names.iter().any(|name| text.contains(name)), "an error that does not name its file: {text}");
         }
-        (found, again) => panic!("{found:?}, then {again:?}"),
+    }
+    if first & 0x0C == 0 {
+        // A debug text compares what is not a number, too.
+        let again = Calibration::parse(&sources, pictures);
+        assert_eq!(format!("{found:?}"), format!("{again:?}"), "the same text again");
     }
 }
 

@@ -5,21 +5,11 @@ use fencepost_core::{
     detector::Detector,
     disparity::{DisparityPixel, Reason},
     geometry::{Mount, RectifiedPair},
-    ground::GroundSettings,
-    health::HealthSettings,
-    map::{MapGeometry, MapSettings},
-    matching::{MatchCost, MatchSettings, Prefilter},
-    methods::{
-        ConfidenceSettings, CostMapSettings, DetectorKind, DisparitySegmentSettings, GroundDeviationSettings,
-        PixelNormalSettings,
-    },
-    obstacles::ObstacleSettings,
     settings::Settings,
-    surfaces::{SurfaceSettings, TILE},
-    validate::ValidateSettings,
+    surfaces::TILE,
 };
 
-use crate::Source;
+use crate::{Source, settings};
 
 /// Largest width, px: more than a tile.
 pub(crate) const WIDTH: usize = 40;
@@ -69,11 +59,15 @@ impl Camera {
             left_m: source.one_of(&[0.0, 0.0, 0.3, -1.0]),
             yaw_left_deg: source.one_of(&[0.0, 0.0, 30.0, -90.0, 179.0]),
         };
-        let mut camera = Self { pair, mount, settings: settings(source) };
+        let mut camera = Self { pair, mount, settings: settings::read(source) };
         // Now and then a number that nobody should have written.
-        if source.below(16) == 15 {
-            let value = f32::from_bits(source.double_word());
-            *camera.number(source.byte()) = value;
+        match source.byte() {
+            of if of % 16 != 15 => {}
+            0..128 => {
+                let value = f32::from_bits(source.double_word());
+                *camera.number(source.byte()) = value;
+            }
+            _ => settings::change(source, &mut camera.settings),
         }
         camera
     }
@@ -128,134 +122,6 @@ pub(crate) fn frames(source: &mut Source<'_>) -> usize {
         160..224 => 2,
         224..248 => 3,
         248.. => 4,
-    }
-}
-
-/// Settings of all stages, with limits that small pictures reach.
-fn settings(source: &mut Source<'_>) -> Settings {
-    let detector = source.one_of(&[
-        DetectorKind::SurfaceNormals,
-        DetectorKind::SurfaceNormals,
-        DetectorKind::SurfaceNormals,
-        DetectorKind::CostMap,
-        DetectorKind::GroundDeviation,
-        DetectorKind::DisparitySegments,
-        DetectorKind::PixelNormals,
-    ]);
-    let other = source.one_of(&DetectorKind::ALL);
-    let cross_check = (source.below(4) == 3 && other != detector).then_some(other);
-    Settings {
-        detector,
-        cross_check,
-        matching: matching(source),
-        validate: ValidateSettings {
-            min_surface_px: source.one_of(&[0, 0, 8, 40]),
-            step_sixteenths: source.one_of(&[8, 0, 16, 1024]),
-        },
-        surfaces: SurfaceSettings {
-            step_sixteenths: source.one_of(&[16, 0, 1, 8, 64]),
-            min_pixels: source.one_of(&[16, 16, 24, 100]),
-            horizontal_deg: source.one_of(&[30.0, 10.0, 45.0]),
-            vertical_deg: source.one_of(&[45.0, 60.0, 89.0]),
-        },
-        ground: ground(source),
-        obstacles: obstacles(source),
-        map: map(source),
-        health: HealthSettings {
-            low_coverage_percent: source.one_of(&[8.0, 0.0, 60.0]),
-            blind_coverage_percent: source.one_of(&[1.0, 0.0, 30.0]),
-            exchange_test_percent: source.one_of(&[15.0, 0.0, 100.0]),
-            trigger_frames: 1 + source.below(2) as u8,
-            release_frames: source.one_of(&[5, 1, 2]),
-            ..HealthSettings::default()
-        },
-        cost_map: CostMapSettings {
-            min_points: source.one_of(&[10, 2]),
-            min_columns: source.one_of(&[24, 2]),
-            obstacle_cost: source.one_of(&[20, 2]),
-            ..CostMapSettings::default()
-        },
-        ground_deviation: GroundDeviationSettings {
-            hypotheses: source.one_of(&[8, 0, 2]),
-            samples: source.one_of(&[100, 400]),
-            ..GroundDeviationSettings::default()
-        },
-        disparity_segments: DisparitySegmentSettings::default(),
-        pixel_normals: PixelNormalSettings {
-            window: source.one_of(&[11, 3, 5, 21]),
-            min_filled_percent: source.one_of(&[50, 0, 100]),
-            ..PixelNormalSettings::default()
-        },
-        confidence: ConfidenceSettings {
-            disputed_percent: source.one_of(&[50, 0, 100]),
-            unconfirmed_percent: source.one_of(&[80, 0, 100]),
-        },
-    }
-}
-
-fn matching(source: &mut Source<'_>) -> MatchSettings {
-    MatchSettings {
-        disparities: source.one_of(&[12, 8, 9]),
-        min_disparity: source.one_of(&[0, 0, 1, 3]),
-        cost: source.one_of(&[MatchCost::Census, MatchCost::AbsoluteDifferences]),
-        window_width: source.one_of(&[5, 9, 7]),
-        window_height: source.one_of(&[5, 7]),
-        wide_window_width: source.one_of(&[0, 15, 31]),
-        weak_texture: source.one_of(&[224, 0, 1000]),
-        prefilter: source.one_of(&[Prefilter::HorizontalSobel, Prefilter::Grey]),
-        texture: source.one_of(&[32, 0, 200]),
-        uniqueness_percent: source.one_of(&[6, 0, 20]),
-        back_check: source.below(4) > 0,
-        saturated_percent: source.one_of(&[60, 100, 1]),
-        ..MatchSettings::DEFAULT
-    }
-}
-
-fn ground(source: &mut Source<'_>) -> GroundSettings {
-    GroundSettings {
-        max_tilt_deg: source.one_of(&[20.0, 0.0, 45.0]),
-        height_tolerance_m: source.one_of(&[0.5, 0.0, 5.0]),
-        fit_noise_max_px: source.one_of(&[0.7, 0.0, 4.0]),
-        surface_tolerance_m: source.one_of(&[0.06, 0.3]),
-        terrain_patch_m: source.one_of(&[0.75, 0.1]),
-        min_support_permille: source.one_of(&[2.0, 100.0]),
-        other_height_support_permille: source.one_of(&[20.0, 0.0, 2000.0]),
-        hold_frames: source.one_of(&[0, 1, 10]),
-        ..GroundSettings::default()
-    }
-}
-
-fn obstacles(source: &mut Source<'_>) -> ObstacleSettings {
-    ObstacleSettings {
-        min_height_m: source.one_of(&[0.25, 0.02]),
-        min_pixels: source.one_of(&[40, 0, 16]),
-        min_area_m2: source.one_of(&[0.02, 0.0]),
-        min_size_m: source.one_of(&[0.15, 0.0]),
-        max_range_m: source.one_of(&[40.0, 3.0]),
-        ..ObstacleSettings::default()
-    }
-}
-
-fn map(source: &mut Source<'_>) -> MapSettings {
-    let (x_count, y_count) = source.one_of(&[(8, 8), (16, 4), (4, 16), (1, 1), (64, 1)]);
-    MapSettings {
-        geometry: MapGeometry {
-            cell_size_mm: source.one_of(&[500, 250, 100, 2000]),
-            x_first: source.one_of(&[0, 0, -2, -64]),
-            x_count,
-            y_first: source.one_of(&[-4, -4, -8, 0]),
-            y_count,
-        },
-        obstacle_cover: source.one_of(&[0.1, 0.0, 1.0]),
-        obstacle_min_pixels: source.one_of(&[4, 1, 24]),
-        free_cover: source.one_of(&[0.03, 0.0, 1.0]),
-        free_min_pixels: source.one_of(&[4, 1]),
-        height_noise_px: source.one_of(&[0.8, 0.0]),
-        smear_share: source.one_of(&[0.33, 0.0, 1.0]),
-        smear_cells: source.one_of(&[2, 0, 8]),
-        max_range_m: source.one_of(&[30.0, 2.0]),
-        sector_width_deg: source.one_of(&[5.0, 18.0, 0.5]),
-        ..MapSettings::default()
     }
 }
 

@@ -24,6 +24,7 @@ mod rectifier;
 #[cfg(feature = "host")]
 mod rig;
 mod seeds;
+mod settings;
 mod source;
 mod surfaces;
 

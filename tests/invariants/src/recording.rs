@@ -152,7 +152,7 @@ pub fn run(bytes: &[u8]) {
         let folder = &folders.folders[folder];
         let path = folder.join(file.name());
         fs::write(&path, content(&mut source, file)).expect("a file");
-        check(folder);
+        check(folder, which & 0x60 == 0);
         fs::write(&path, file.good()).expect("a file");
     });
 }
@@ -175,20 +175,21 @@ fn content(source: &mut Source<'_>, file: File) -> Vec<u8> {
     png(size, header, &data)
 }
 
-/// A recording is refused with words, or each of its pairs is one of two pictures of the size that was told, or refused.
-fn check(folder: &Path) {
-    for lidar in [LidarCalibration::read(folder), LidarCalibration::read(folder)] {
-        match lidar {
-            Ok(Some(lidar)) => assert!(lidar.focal_px > 0.0 && lidar.to_camera.iter().flatten().all(|n| n.is_finite())),
-            Ok(None) => {}
-            Err(error) => assert!(!error.to_string().is_empty()),
-        }
+/// A recording is refused with words, or each of its pairs is one of two pictures of the size that was told, or refused; the same if
+/// it is opened `twice`.
+fn check(folder: &Path, twice: bool) {
+    match LidarCalibration::read(folder) {
+        Ok(Some(lidar)) => assert!(lidar.focal_px > 0.0 && lidar.to_camera.iter().flatten().all(|n| n.is_finite())),
+        Ok(None) => {}
+        Err(error) => assert!(!error.to_string().is_empty()),
     }
     let recording = match Recording::open(folder) {
         Ok(recording) => recording,
         Err(error) => return assert!(!error.to_string().is_empty()),
     };
-    assert_eq!(Recording::open(folder).ok().as_ref(), Some(&recording), "the same files again");
+    if twice {
+        assert_eq!(Recording::open(folder).ok().as_ref(), Some(&recording), "the same files again");
+    }
     assert_eq!(recording.mount.check(), Ok(()));
     assert!(!recording.frames.is_empty() && recording.frames.len() < 10_000);
     for frame in &recording.frames {

@@ -25,24 +25,20 @@ pub fn run(bytes: &[u8]) {
         });
         let file = folder.path().join("rig.toml");
         fs::write(&file, text).expect("a file");
-        check(&file, text, first & 1 == 1);
+        check(&file, text, first & 1 == 1, first & 6 == 0);
     });
 }
 
-/// Every mistake is told with its line, twice the same; where there is none, every number can be used.
-fn check(file: &Path, text: &[u8], with_rig: bool) {
-    let (found, again) = (Config::read_all(file, with_rig), Config::read_all(file, with_rig));
-    let (config, mistakes) = match (found, again) {
-        (Ok((config, mistakes)), Ok((_, again))) => {
-            assert_eq!(format!("{mistakes:?}"), format!("{again:?}"), "the same text again");
-            (config, mistakes)
-        }
-        (Err(failure), Err(_)) => {
-            assert!(std::str::from_utf8(text).is_err(), "{failure}");
-            return;
-        }
-        _ => panic!("the same text is read in two ways"),
+/// Every mistake is told with its line, and the same if it is read `twice`; where there is none, every number can be used.
+fn check(file: &Path, text: &[u8], with_rig: bool, twice: bool) {
+    let (config, mistakes) = match Config::read_all(file, with_rig) {
+        Ok(found) => found,
+        Err(failure) => return assert!(std::str::from_utf8(text).is_err(), "{failure}"),
     };
+    if twice {
+        let again = Config::read_all(file, with_rig).map(|(_, again)| format!("{again:?}"));
+        assert_eq!(again.ok(), Some(format!("{mistakes:?}")), "the same text again");
+    }
     let lines = text.split(|byte| *byte == b'\n').count();
     let mut seen = BTreeSet::new();
     for mistake in &mistakes {

@@ -45,9 +45,9 @@ pub fn run(bytes: &[u8]) {
     // Mostly a strip with a border of tiles across it: so few pixels are soon gone through, and the fewer the more executions.
     let (length, breadth) = ((TILE + 1 + source.below(3)) as u32, 1 + source.below(6) as u32);
     let size = match source.byte() {
-        0..100 => (length, breadth),
-        100..200 => (breadth, length),
-        200.. => (camera.pair.width, camera.pair.height),
+        0..120 => (length, breadth),
+        120..240 => (breadth, length),
+        240.. => (camera.pair.width, camera.pair.height),
     };
     (camera.pair.width, camera.pair.height) = size;
     let Ok(frame) = VehicleFrame::new(&camera.mount.without_place()) else { return };
