@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use fencepost_core::{
+    detector::DetectError,
     disparity::DisparityPixel,
     geometry::StereoCalibration,
     health::{Health, HealthLevel},
@@ -51,6 +52,10 @@ impl Detectors {
         let mut same_alone = frames > 1 && camera.settings.ground.hold_frames == 0;
         for frame in 0..frames {
             draw(source, &camera, pixels);
+            if twice {
+                let wrong = first.interpret(&pixels[1..], &mut ()).err();
+                assert!(matches!(wrong, Some(DetectError::WrongSize { .. })), "a pixel too few: {wrong:?}");
+            }
             assert!(first.interpret(pixels, &mut ()).is_ok(), "a picture of the right size");
             check(first, &camera, false);
             // What is known of a pixel stays, or the pixel is part of a small surface.

@@ -14,6 +14,7 @@ mod disparity;
 mod frames;
 #[cfg(feature = "host")]
 mod live;
+mod matchers;
 mod pairs;
 #[cfg(feature = "host")]
 mod pixels;

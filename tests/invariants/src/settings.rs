@@ -79,7 +79,8 @@ pub(crate) fn read(source: &mut Source<'_>) -> Settings {
     }
 }
 
-fn matching(source: &mut Source<'_>) -> MatchSettings {
+/// Those of the matcher.
+pub(crate) fn matching(source: &mut Source<'_>) -> MatchSettings {
     MatchSettings {
         disparities: source.one_of(&[12, 8, 9]),
         min_disparity: source.one_of(&[0, 0, 1, 3]),
