@@ -40,7 +40,7 @@ pub(crate) fn check(source: &mut Source<'_>) {
     let any = 8 + source.below(DISPARITIES - 7) as u16;
     let settings =
         MatchSettings { disparities: source.one_of(&[16, 32, 48, 64, 80, any]), ..settings::matching(source) };
-    let backend = source.one_of(&Backend::ALL);
+    let backend = source.one_of(Backend::ALL);
     let size = (source.one_of(&[64, 80, 100, WIDTH]), usize::from(settings.window_height) + 6 + source.below(3));
     let sides = [(source.below(20), source.below(20)), (source.below(20), source.below(20))];
     MATCHERS.with_borrow_mut(|matchers| {

@@ -276,6 +276,6 @@ pub(crate) fn change(source: &mut Source<'_>, settings: &mut Settings) {
 }
 
 /// One of several.
-fn pick<'a, T, const N: usize>(which: u8, all: [&'a mut T; N]) -> &'a mut T {
+fn pick<T, const N: usize>(which: u8, all: [&mut T; N]) -> &mut T {
     all.into_iter().nth(usize::from(which) % N).expect("a place among them")
 }

@@ -42,8 +42,8 @@ pub fn run(bytes: &[u8]) {
     if camera.pair.check().is_err() {
         return;
     }
-    // Mostly a strip with a border of tiles across it: so few pixels are soon gone through, and the fewer the more executions.
-    let (length, breadth) = ((TILE + 1 + source.below(3)) as u32, 1 + source.below(6) as u32);
+    // Mostly a strip with a border of tiles across it, with room for surfaces on both sides: so few pixels are soon gone through.
+    let (length, breadth) = ((TILE + source.one_of(&[1, 4, 8, 16])) as u32, 2 + source.below(7) as u32);
     let size = match source.byte() {
         0..120 => (length, breadth),
         120..240 => (breadth, length),
