@@ -77,8 +77,7 @@ fn main() -> ! {
     static mut CELLS_OF_SCAN: Vec<Cell, CELLS> = Vec::new();
     static mut FRAMES_OF_SCAN: Vec<Frame, FRAMES> = Vec::new();
 
-    // SAFETY: the board has that much memory there, nobody writes to it, and any bytes are bytes.
-    let mut rest: &'static [u8] = unsafe { core::slice::from_raw_parts(PICTURES as *const u8, ROOM) };
+    let mut rest = memory();
     let Some(peripherals) = Peripherals::take() else { fail("the timer is taken") };
     let mut clock = Clock::new(peripherals.SYST);
     if !clock.counts() {
@@ -98,7 +97,7 @@ fn main() -> ! {
         match stage {
             "rectify" | "match" | "health" => {
                 let (left, right) = (take(&mut rest, PIXELS), take(&mut rest, PIXELS));
-                detect(DETECTOR, stage, numbers[9], [left, right], &mut clock);
+                detect(DETECTOR, stage, &numbers, [left, right], &mut clock);
             }
             "wire" => {
                 let states = take(&mut rest, CELLS);
@@ -109,6 +108,12 @@ fn main() -> ! {
     }
     hprintln!("done");
     board::succeed()
+}
+
+/// Where the simulator has laid the pictures.
+fn memory() -> &'static [u8] {
+    // SAFETY: the board has that much memory there, nobody writes to it, and any bytes are bytes.
+    unsafe { core::slice::from_raw_parts(PICTURES as *const u8, ROOM) }
 }
 
 fn take(rest: &mut &'static [u8], length: usize) -> &'static [u8] {
@@ -135,14 +140,19 @@ fn told(stage: &str, clock: &mut Clock) {
 }
 
 /// The whole detector: rectification, matching and health work on the same rows.
-fn detect(detector: &mut Whole, stage: &str, number: u32, pair: [&[u8]; 2], clock: &mut Clock) {
+fn detect(detector: &mut Whole, stage: &str, numbers: &[u32; 12], pair: [&'static [u8]; 2], clock: &mut Clock) {
     let mount = Mount { height_m: Some(1.0), ..Mount::default() };
     let mut settings = Settings::default();
     settings.matching.disparities = DISPARITIES as u16;
-    if detector.configure(&settings, &calibration(stage, number), &mount).is_err() {
+    if detector.configure(&settings, &calibration(stage, numbers), &mount).is_err() {
         fail("the detector cannot be configured");
     }
-    let pictures = pair.map(|pixels| Picture::packed(pixels, WIDTH, HEIGHT));
+    // Larger pictures show whatever lies in the memory.
+    let scale = scale(stage, numbers);
+    let pair = if scale > 1 { [memory(); 2] } else { pair };
+    let pixels = scale * scale * PIXELS;
+    let pictures =
+        pair.map(|all| Picture::packed(all.get(..pixels).unwrap_or_default(), scale * WIDTH, scale * HEIGHT));
     let [Ok(left), Ok(right)] = pictures else { fail("the pictures are too small") };
     clock.begin();
     if detector.detect(&left, &right, clock).is_err() {
@@ -220,8 +230,7 @@ impl Stages {
         if stage == "obstacles" {
             return told(stage, clock);
         }
-        let view =
-            View { pair: &pair, frame: &frame, place: &place, rays: &rays, depth: self.depth, nearest_m: 0.5 };
+        let view = View { pair: &pair, frame: &frame, place: &place, rays: &rays, depth: self.depth, nearest_m: 0.5 };
         clock.begin();
         entry_map_run(self.builder, self.surfaces, picture, &view, (terrain, true), self.map);
         told(stage, clock);
@@ -229,7 +238,13 @@ impl Stages {
 }
 
 /// A map of `states`, one byte for each cell: unknown, free, obstacle.
-fn encode(numbers: &[u32; 12], states: &[u8], cells: &mut Vec<Cell, CELLS>, frames: &mut VecView<Frame>, clock: &mut Clock) {
+fn encode(
+    numbers: &[u32; 12],
+    states: &[u8],
+    cells: &mut Vec<Cell, CELLS>,
+    frames: &mut VecView<Frame>,
+    clock: &mut Clock,
+) {
     cells.clear();
     for state in states {
         let state = match state {
@@ -304,8 +319,14 @@ fn fill_level(level: &mut [DisparityPixel; PIXELS], rays: &Rays, pair: &Rectifie
     }
 }
 
-/// Cameras as `number` says; for rectifying they may be turned.
-fn calibration(stage: &str, number: u32) -> StereoCalibration {
+/// How much larger than the rectified pictures those of the cameras are: then a segment lies across more of them.
+fn scale(stage: &str, numbers: &[u32; 12]) -> usize {
+    if stage == "rectify" { 1 + (numbers[10] % 4) as usize } else { 1 }
+}
+
+/// Cameras as the numbers say; for rectifying they may be turned.
+fn calibration(stage: &str, numbers: &[u32; 12]) -> StereoCalibration {
+    let (number, scale) = (numbers[9], scale(stage, numbers));
     let pair = pair();
     if stage != "rectify" {
         return StereoCalibration::Rectified(pair);
@@ -314,13 +335,14 @@ fn calibration(stage: &str, number: u32) -> StereoCalibration {
     let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
     let turn = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]];
     let focal = pair.focal_px * (1.0 + (number / 180 % 4) as f32);
+    let times = scale as f32;
     let camera = CameraModel {
-        width: WIDTH as u32,
-        height: HEIGHT as u32,
-        fx: focal,
-        fy: focal,
-        cx: pair.cx,
-        cy: pair.cy,
+        width: (scale * WIDTH) as u32,
+        height: (scale * HEIGHT) as u32,
+        fx: times * focal,
+        fy: times * focal,
+        cx: times * pair.cx,
+        cy: times * pair.cy,
         distortion: Distortion::default(),
     };
     let none = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];

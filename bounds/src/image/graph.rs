@@ -120,7 +120,7 @@ impl Graph {
                 backs: BTreeSet::new(),
             });
             found.backs.insert(from);
-            let after = self.after(head);
+            let after = self.reached_from(head);
             let mut left = vec![from];
             while let Some(at) = left.pop() {
                 if after.contains(&at) && found.blocks.insert(at) {
@@ -132,7 +132,7 @@ impl Graph {
     }
 
     /// Blocks that can be reached from one.
-    fn after(&self, from: usize) -> BTreeSet<usize> {
+    fn reached_from(&self, from: usize) -> BTreeSet<usize> {
         let (mut after, mut left) = (BTreeSet::new(), vec![from]);
         while let Some(at) = left.pop() {
             if after.insert(at) {
@@ -215,4 +215,77 @@ impl Image {
 
 fn jumps(instruction: &Instruction) -> bool {
     instruction.writes(PC) || matches!(ArmInsn::from(instruction.id), ArmInsn::ARM_INS_BX | ArmInsn::ARM_INS_BLX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks of one instruction each, by where they lead; those that lead nowhere end the function.
+    fn graph(next: &[&[usize]]) -> Graph {
+        let block = |(at, next): (usize, &&[usize])| Block {
+            instructions: vec![at as u32],
+            next: next.to_vec(),
+            calls: Vec::new(),
+            ends: next.is_empty(),
+        };
+        Graph { blocks: next.iter().enumerate().map(block).collect() }
+    }
+
+    /// Head, blocks, and blocks that go back, of each loop.
+    fn loops(next: &[&[usize]]) -> Vec<(usize, Vec<usize>, Vec<usize>)> {
+        let all = graph(next).loops().into_iter();
+        all.map(|one| (one.head, one.blocks.into_iter().collect(), one.backs.into_iter().collect())).collect()
+    }
+
+    #[test]
+    fn loops_are_found_one_within_the_other() {
+        // 0 -> 1 -> 2 <-> 3, 3 -> 1, 3 -> 4
+        let found = loops(&[&[1], &[2], &[3], &[1, 2, 4], &[]]);
+        assert_eq!(found, [(1, vec![1, 2, 3], vec![3]), (2, vec![2, 3], vec![3])]);
+    }
+
+    #[test]
+    fn a_circle_that_is_entered_in_two_places_is_a_loop_all_the_same() {
+        // 0 -> 1 and 0 -> 2, 1 <-> 2, 2 -> 3
+        let found = loops(&[&[1, 2], &[2], &[1, 3], &[]]);
+        assert_eq!(found, [(1, vec![1, 2], vec![2])]);
+    }
+
+    #[test]
+    fn without_a_way_back_there_is_no_loop() {
+        assert_eq!(loops(&[&[1, 2], &[3], &[3], &[]]), []);
+    }
+
+    #[test]
+    fn every_circle_of_a_random_graph_goes_through_a_way_back() {
+        let mut seed = 0x5eed_0042u32;
+        let mut random = |below: usize| {
+            seed ^= seed << 13;
+            seed ^= seed >> 17;
+            seed ^= seed << 5;
+            seed as usize % below
+        };
+        for _ in 0..500 {
+            let count = 2 + random(9);
+            let next: Vec<Vec<usize>> = (0..count).map(|_| (0..random(4)).map(|_| random(count)).collect()).collect();
+            let next: Vec<&[usize]> = next.iter().map(Vec::as_slice).collect();
+            let graph = graph(&next);
+            let backs: BTreeSet<(usize, usize)> =
+                graph.loops().iter().flat_map(|one| one.backs.iter().map(|back| (*back, one.head))).collect();
+            // What can be reached without them can be put in an order: nothing comes back to where it began.
+            let reached = graph.reached_from(0);
+            for &start in &reached {
+                let (mut seen, mut left) = (BTreeSet::new(), vec![start]);
+                while let Some(at) = left.pop() {
+                    for &to in next[at].iter().filter(|to| !backs.contains(&(at, **to))) {
+                        assert_ne!(to, start, "{next:?}");
+                        if seen.insert(to) {
+                            left.push(to);
+                        }
+                    }
+                }
+            }
+        }
+    }
 }

@@ -113,3 +113,24 @@ impl super::Image {
         text.lines().nth((line as usize).saturating_sub(1)).unwrap_or_default().trim().to_owned()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_told_without_what_they_are_generic_over() {
+        assert_eq!(plain("<core_a::Matcher<320, 48>>::pass"), "core_a::Matcher::pass");
+        assert_eq!(plain("<a::Ticket<a::Rows<3>> as b::Job>::run"), "a::Ticket::run");
+        assert_eq!(plain("a::spread_line::<40>"), "a::spread_line");
+        assert_eq!(plain("memcpy"), "memcpy");
+    }
+
+    #[test]
+    fn lines_of_the_core_are_told_from_those_of_the_library_that_is_called_so_too() {
+        let line = |file: &str| Line { file: file.to_owned(), ..Line::default() };
+        assert_eq!(line("/any/where/core/src/wire/select.rs").core_file(), Some("wire/select.rs"));
+        assert_eq!(line("/usr/lib/library/core/src/iter/range.rs").core_file(), None);
+        assert_eq!(line("/any/where/libm/src/math.rs").core_file(), None);
+    }
+}

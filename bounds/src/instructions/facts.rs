@@ -31,6 +31,8 @@ pub(super) struct Fact {
     pub(super) most: Most,
     /// Steps of source that a round of it takes, where the compiler has unrolled it: as often, at least, its line is in its code.
     pub(super) by: usize,
+    /// Reads or writes of its line that its code has at least: those of so many steps.
+    pub(super) written: usize,
     /// Loops that take so many steps together, by a name that [`Stage::groups`] has.
     pub(super) group: Option<&'static str>,
     /// Whether it is told of every stage, and need not be in each.
@@ -40,7 +42,7 @@ pub(super) struct Fact {
 impl Fact {
     /// As [`Self::by`], where a round may end before all of them.
     const fn early(mut self, by: usize) -> Self {
-        (self.by, self.most.each) = (by, by as u64);
+        (self.by, self.written, self.most.each) = (by, by, by as u64);
         self
     }
 
@@ -50,7 +52,13 @@ impl Fact {
     }
 
     const fn by(mut self, by: usize) -> Self {
-        self.by = by;
+        (self.by, self.written) = (by, by);
+        self
+    }
+
+    /// For a line whose steps read or write more than once.
+    const fn written(mut self, times: usize) -> Self {
+        self.written = times;
         self
     }
 
@@ -76,11 +84,11 @@ pub(super) struct Stage {
 }
 
 const fn total(file: &'static str, text: &'static str, more: u64) -> Fact {
-    Fact { at: At::Line(file, text), most: Most { each: 0, more }, by: 1, group: None, is_shared: false }
+    Fact { at: At::Line(file, text), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 const fn each(file: &'static str, text: &'static str, each: u64) -> Fact {
-    Fact { at: At::Line(file, text), most: Most { each, more: 0 }, by: 1, group: None, is_shared: false }
+    Fact { at: At::Line(file, text), most: Most { each, more: 0 }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
@@ -96,6 +104,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
     let (tiles_down, tiles) = (height.div_ceil(32), height.div_ceil(32) * width.div_ceil(32));
     let cells = shape.settings.map.geometry.len() as u64;
     let surfaces = shape.surfaces;
+    let limit = shape.wire_runs.min(cells);
     vec![
         Stage {
             name: "rectify",
@@ -106,7 +115,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     each("rectify/mod.rs", "for (to, from) in copied", width),
                     each("rectify/sample.rs", "for pixel in out {", 8),
                 ],
-                library(width / 4, width / 4, 0),
+                library([width / 4; 2], [0; 2]),
             ]
             .concat(),
             calls: vec![],
@@ -119,7 +128,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                 vec![
                     total("validate/mod.rs", "for y in 0..picture.len()", height),
                     total("validate/mod.rs", "for x in (0..row.len()).step_by(PIECE)", of("validate", "pieces")),
-                    each("links.rs", "for (flag, (a, b)) in", 4),
+                    each("links.rs", "for (flag, (a, b)) in || *flag = u8::from(a.abs_diff", 32).by(8),
                     total("links.rs", "(bit != 0)", of("validate", "starts_and_joins")),
                     total("validate/mod.rs", "filter(|&parent| parent != label)", of("validate", "hops")),
                     each("links.rs", "for (to, from) in piece.iter_mut().zip(pixels)", width % 32),
@@ -129,7 +138,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     total("validate/mod.rs", "while let Some(Step", of("validate", "pixels_taken_out")),
                 ],
                 // Pieces of 64 bytes, and the entries of the surfaces that go on, 8 bytes each.
-                library(16, 16, 2 * height * width),
+                library([32, 32], [height * width, 2 * height * width]),
             ]
             .concat(),
             // A surface ends once.
@@ -144,13 +153,13 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                 vec![
                     total("obstacles/mod.rs", "for root in regions.roots()", surfaces),
                     total("obstacles/mod.rs", "for member in regions.members(root)", surfaces),
-                    total("obstacles/mod.rs", "for surface in members", 2 * surfaces),
+                    total("obstacles/mod.rs", "for surface in members", surfaces),
                     total("obstacles/mod.rs", ".position( || for listed in || core::mem::swap(listed", of("obstacles", "obstacles_passed")),
                     // An angle of less than two turns is cut.
                     function("compiler_builtins::math::full_availability::fmodf", 4, 0),
                     function("compiler_builtins::int::specialized_div_rem::u64_div_rem", 64, 0),
                 ],
-                library(16, 16, surfaces),
+                library([16; 2], [surfaces, 0]),
             ]
             .concat(),
             calls: vec![],
@@ -167,12 +176,12 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     total("map/votes.rs", "for (common, surface) in", of("map", "surfaces")),
                     total("map/votes.rs", "for y in y0", of("map", "rows_of_tiles")),
                     each("links.rs", "for (to, from) in piece.iter_mut().zip(pixels)", width % 32),
-                    each("map/votes.rs", "ray[k] = *now", 32 / 8),
+                    each("map/votes.rs", "ray[k] = *now", 32).by(8).written(32),
                     total("map/votes.rs", "and_then(|i| self.common.get(i)) else { continue }", of("map", "runs")),
                     total("map/votes.rs", ".fill(noise)", of("map", "noise_filled")).by(4),
                     total("map/votes.rs", "for first in (0..TILE)", 4 * rows_of_tiles),
                     each("map/votes.rs", "for k in 0..LANES", 8),
-                    each("ground/terrain.rs", "parts[k] = ", 8 / 2),
+                    each("ground/terrain.rs", "parts[k] = ", 8).by(2).written(4),
                     total("links.rs", "(bit != 0)", of("map", "votes")),
                     total("map/votes.rs", "evidence.height_dm = heights", 32 * rows_of_tiles).by(4),
                     each("map/shadow.rs", "pub(super) fn mark", 128),
@@ -182,7 +191,8 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     total("map/smear.rs", "let smears = (1..=", of("map", "cells_looked_back") / 2),
                     function("memcmp", 32, 0),
                 ],
-                library(32, 32, 3 * cells),
+                // The rays of a row of a tile, and the table of cells.
+                library([32, 32], [128 * rows_of_tiles + 3 * cells, 0]),
             ]
             .concat(),
             calls: vec![],
@@ -195,13 +205,10 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                 vec![
                     total("wire/select.rs", "for (row, a) in", cells / u64::from(shape.settings.map.geometry.y_count)),
                     total("wire/select.rs", "for (b, cell) in", of("wire", "cells")),
-                    Fact {
-                        at: At::Line("wire/select.rs", "loop { || if a < heap.len() && b < heap.len() || heap.swap(a, b)"),
-                        most: Most { each: 1, more: of("wire", "sifts") },
-                        by: 1,
-                        group: None,
-                    is_shared: false,
-                    },
+                    // Once more each than it exchanges: as often as runs are sorted, come into the heap, and become one.
+                    sifts("loop { <- sift_down(rest, 0)", sorting(limit)),
+                    sifts("loop { <- sift_down(heap, parent)", limit),
+                    sifts("loop { || heap.swap(a, b) <- sift_down(heap, 0)", of("wire", "sifts") - sorting(limit) - limit),
                     each("wire/select.rs", "for len in (1..heap.len())", shape.wire_runs),
                     each("wire/select.rs", "for parent in (0..heap.len() / 2)", shape.wire_runs / 2),
                     each("wire/select.rs", "runs.iter().fold(0u32", shape.wire_runs),
@@ -212,7 +219,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     each("wire/message/cells.rs", "for (k, run) in", shape.wire_runs.div_ceil(shape.wire_frames)),
                     function("compiler_builtins::int::specialized_div_rem::u64_div_rem", 64, 0),
                 ],
-                library(24, 24, 0),
+                library([24; 2], [0; 2]),
             ]
             .concat(),
             // When the list is full, and before it is sorted.
@@ -226,7 +233,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                 vec![
                     unwritten("fencepost_core::surfaces::part::Part::keep_largest", tiles),
                     total("surfaces/tile.rs", "for (y, row) in rows.iter_mut()", rows_of_tiles),
-                    each("links.rs", "for (flag, (a, b)) in", 4),
+                    each("links.rs", "for (flag, (a, b)) in || *flag = u8::from(a.abs_diff", 32).by(8),
                     total("surfaces/tile.rs", "for (run, bit) in (runs..AREA)", pixels),
                     total("links.rs", "bit <- for bit in each_bit(up", of("surfaces", "joins")),
                     total("links.rs", "bit <- for bit in each_bit(links.starts())", pixels),
@@ -241,13 +248,13 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     total("surfaces/mod.rs", "if labels.iter().all(", pixels).early(4),
                     total("surfaces/moments.rs", "for z in z {", pixels),
                     total("surfaces/moments.rs", "for ((z, square), column) || *square = ", 3 * 32 * rows_of_tiles).by(8),
-                    total("surfaces/moments.rs", "for (&square, column)", 3 * 32 * rows_of_tiles).by(8),
+                    total("surfaces/moments.rs", "for (&square, column)", 3 * 32 * rows_of_tiles).by(8).written(8),
                     total("surfaces/mod.rs", "for (i, number) in renumbered", of("surfaces", "planes")),
                     total("surfaces/mod.rs", "for y in 0..tile.height { then for &label", rows_of_tiles),
                     total("surfaces/mod.rs", "for y in 0..tile.height { then let pixels", rows_of_tiles),
                     total("surfaces/mod.rs", "for y in 0..tile.height { then let v", rows_of_tiles),
                     total("surfaces/mod.rs", "for y in 0..tile.height { then for label", rows_of_tiles),
-                    total("surfaces/mod.rs", "for label in self.labels || *label = usize::from", pixels).by(4),
+                    total("surfaces/mod.rs", "for label in self.labels || *label = usize::from", pixels).by(4).written(8),
                     // Which are kept where there are too many.
                     total("surfaces/mod.rs", "for &label in self.labels", pixels).by(4),
                     total("surfaces/mod.rs", "for &pixels in pixels.iter() || if let Some(count) = by_size", 51 * tiles),
@@ -258,7 +265,8 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                 angles(),
                 // The numbers of the runs of a row, byte by byte or a word at a time; and what a tile begins with.
                 fills(pixels, tiles * 128),
-                library(16, 16, 512 * 3),
+                // What lies beside a tile: how the pixels of its rows hang together, and sizes where there are too many.
+                library([32, 32], [64 * tiles + 512, 64 * tiles]),
             ]
             .concat(),
             calls: vec![("libm::math::rem_pio2f::rem_pio2f", 0)],
@@ -300,7 +308,7 @@ Stage {
                     each("ground/terrain.rs", "for j in 0..ACROSS", 40),
                     each("ground/terrain.rs", "for (patch, before) in", 40),
                 ],
-                library(40, 40, 3 * 2 * 1600 + 2 * 2 * surfaces),
+                library([40, 40], [3 * 2 * 1600 + 1600 + 2 * 2 * surfaces, 0]),
             ]
             .concat(),
             calls: vec![
@@ -312,6 +320,23 @@ Stage {
         },
         matching::stage(shape, &of),
     ]
+}
+
+/// A loop that goes down the heap of the wire.
+const fn sifts(text: &'static str, more: u64) -> Fact {
+    Fact {
+        at: At::Line("wire/select.rs", text),
+        most: Most { each: 1, more },
+        by: 1,
+        written: 1,
+        group: None,
+        is_shared: false,
+    }
+}
+
+/// Exchanges of a heap of so many when it is sorted.
+fn sorting(limit: u64) -> u64 {
+    (1..limit).map(|left| 1 + u64::from(left.ilog2())).sum()
 }
 
 /// Sines and cosines of angles of less than two turns: nothing is done about larger ones. Exponents have no more bits to be found
@@ -331,7 +356,7 @@ fn regions(shape: &Shape, times: u64, of: &dyn Fn(&str, &str) -> u64) -> Vec<Fac
         total("surfaces/join.rs", "for i in 0..border.length", of(stage, "pairs")),
         total(
             "surfaces/join.rs",
-            "while of_a != a || place = after(&self.next, place) || if place == give || if let Some(parent) = self.parent.get_mut(place)",
+            "while of_a != a || if place == give || self.parent.get_mut(place)",
             of(stage, "surfaces_moved"),
         ),
         each("surfaces/join.rs", "for place in 0..self.len", shape.surfaces),
@@ -342,16 +367,16 @@ fn regions(shape: &Shape, times: u64, of: &dyn Fn(&str, &str) -> u64) -> Vec<Fac
 
 /// The loop of a function that no line leads back to the head of.
 const fn unwritten(name: &'static str, more: u64) -> Fact {
-    Fact { at: At::Unwritten(name), most: Most { each: 0, more }, by: 1, group: None, is_shared: false }
+    Fact { at: At::Unwritten(name), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 /// The first loop of a function, around all others.
 const fn outermost(name: &'static str, more: u64) -> Fact {
-    Fact { at: At::LoopOf(name, 0), most: Most { each: 0, more }, by: 1, group: None, is_shared: false }
+    Fact { at: At::LoopOf(name, 0), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 const fn function(name: &'static str, each: u64, more: u64) -> Fact {
-    Fact { at: At::Function(name), most: Most { each, more }, by: 1, group: None, is_shared: false }
+    Fact { at: At::Function(name), most: Most { each, more }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 /// Fills of `bytes` in all, and of `words` beside.
@@ -360,31 +385,41 @@ fn fills(bytes: u64, words: u64) -> Vec<Fact> {
         at: At::LoopOf("__aeabi_memset", nth),
         most: Most { each: 0, more },
         by: 1,
+        written: 1,
         group: None,
         is_shared: false,
     };
     vec![fact(0, bytes), fact(1, bytes / 4 + words), fact(2, bytes)]
 }
 
-/// The memory functions: copies and fills of `each` words, or `aligned` ones where that is known, and `more` words in all of longer ones.
-fn library(aligned: u64, each: u64, more: u64) -> Vec<Fact> {
-    let fact = |name, nth, each, more| Fact {
-        at: At::LoopOf(name, nth),
-        most: Most { each, more },
-        by: 1,
-        group: None,
-        is_shared: true,
+/// The memory functions: each fill and copy has so many words at most, the first where it is known that they are whole words, and some have
+/// so many more together: fills, and copies.
+fn library([aligned, each]: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
+    let fact = |name, nth, each, more| {
+        let most = Most { each, more };
+        Fact { at: At::LoopOf(name, nth), most, by: 1, written: 1, group: None, is_shared: true }
     };
     let mut facts = Vec::new();
     for name in ["__aeabi_memclr", "__aeabi_memset"] {
         // Bytes to the first word, words, and bytes behind the last one.
-        facts.extend([fact(name, 0, 16, 0), fact(name, 1, each, more), fact(name, 2, 16, 0)]);
+        facts.extend([fact(name, 0, 16, 0), fact(name, 1, each, filled), fact(name, 2, 16, 0)]);
     }
-    for name in ["__aeabi_memclr4", "__aeabi_memclr8", "__aeabi_memset4", "__aeabi_memcpy4"] {
+    let by_word = [
+        ("__aeabi_memclr4", filled),
+        ("__aeabi_memclr8", filled),
+        ("__aeabi_memset4", filled),
+        ("__aeabi_memcpy4", copied),
+    ];
+    for (name, more) in by_word {
         facts.extend([fact(name, 0, aligned, more), fact(name, 1, 3, 0)]);
     }
     let name = "compiler_builtins::mem::memcpy";
-    facts.extend([fact(name, 0, 16, 0), fact(name, 1, each, more), fact(name, 2, 16, 0), fact(name, 3, each, more)]);
+    facts.extend([
+        fact(name, 0, 16, 0),
+        fact(name, 1, each, copied),
+        fact(name, 2, 16, 0),
+        fact(name, 3, each, copied),
+    ]);
     facts
 }
 
@@ -400,4 +435,30 @@ pub(super) fn is_meant(meant: &str, lines: &[(String, String)]) -> bool {
     };
     let is_outer = |outer: &str| lines.iter().skip(1).any(|(line, _)| line.contains(outer));
     lines.first().is_some_and(is_inner) && outer.is_none_or(is_outer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_meant_by_its_line_the_next_one_and_those_around() {
+        let lines = [("for y in 0..4 {", "let v = y;"), ("self.fill(7)", "}")];
+        let lines = lines.map(|(line, next)| (line.to_owned(), next.to_owned()));
+        assert!(is_meant("for y in", &lines));
+        assert!(is_meant("for x in || for y in", &lines));
+        assert!(is_meant("for y in then let v", &lines) && !is_meant("for y in then let u", &lines));
+        assert!(is_meant("for y in <- self.fill(", &lines) && !is_meant("for y in <- self.clear(", &lines));
+        assert!(!is_meant("self.fill(", &lines) && !is_meant("for y in", &[]));
+    }
+
+    #[test]
+    fn bounds_of_loops_grow_with_the_picture() {
+        let [small, large] = [Shape::of(128, 96, 16), Shape::of(640, 480, 64)].map(|shape| stages(&shape));
+        for (small, large) in small.iter().zip(&large) {
+            let facts = small.facts.iter().zip(&large.facts);
+            let grown = facts.filter(|(small, large)| small.most.more < large.most.more).count();
+            assert!(grown > 0 || small.name == "wire", "{}", small.name);
+        }
+    }
 }

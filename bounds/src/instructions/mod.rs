@@ -70,13 +70,13 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
                 .iter()
                 .any(|&(other, outer)| other == number && outer.head != one.head && outer.blocks.contains(&one.head));
             let (rounds, entered) = rounds(at, graph, one, is_inner, calls.get(&at).map_or(&[], Vec::as_slice));
-            let Fact { most: Most { each, more }, by, .. } = stage.facts[number];
-            let written = times_written(image, graph, &found, one, &stage.facts[number]);
-            if written < by {
+            let Fact { most: Most { each, more }, by, written, .. } = stage.facts[number];
+            let times = times_written(image, graph, &found, one, &stage.facts[number]);
+            if times < written {
                 let address = graph.blocks[one.head].instructions[0];
+                let place = stage.facts[number].place();
                 faults.push(format!(
-                    "a loop at {address:#x} with {written} steps in a round, not {by}: {}",
-                    stage.facts[number].place()
+                    "a round of the loop at {address:#x} is not {by} steps: {times} reads or writes, not {written}: {place}"
                 ));
             }
             if let Some(group) = stage.facts[number].group {

@@ -36,13 +36,15 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 total("matching/rows.rs", "[(&*grey_left", 2 * filtered / width),
                 total("matching/prefilter.rs", "for (out, &grey) in", if grey(settings) { 2 * filtered } else { 0 })
                     .by(4),
-                total("matching/prefilter.rs", "for ((out, ((&a1", if grey(settings) { 0 } else { 2 * filtered }).by(4),
+                total("matching/prefilter.rs", "for ((out, ((&a1", if grey(settings) { 0 } else { 2 * filtered })
+                    .by(4)
+                    .written(24),
                 total("arch/thumb/census.rs", "asm!(", 2 * filtered / 4),
                 // What is left of a row of a width that is no multiple of four.
                 each("matching/census.rs", "for ((code, &centre)", (width - 6) % 4),
-                total("matching/rows.rs", "for ((low, high), &grey)", filtered).by(2),
+                total("matching/rows.rs", "for ((low, high), &grey)", filtered).by(2).written(4),
                 each("matching/rows.rs", "self.kept_spans[y % KEPT] = around", 7),
-                total("matching/rows.rs", "for (sum, (&here, &flags))", 2 * filtered).by(4),
+                total("matching/rows.rs", "for (sum, (&here, &flags))", 2 * filtered).by(4).written(8),
                 total("arch/thumb/slide.rs", "asm!(", of("column_costs_slid") / 2 / 8),
                 total("arch/thumb/slide.rs", "enter.left.iter().zip(leave.left)", filtered).of("rows in"),
                 total(
@@ -61,7 +63,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 total("matching/mod.rs", "weak.contains(&true)", rows * width).early(4),
                 each("matching/rows.rs", "(first..y.saturating_add(radius))", u64::from(settings.window_height) + 2),
                 total("matching/best.rs", "self.tables.as_flattened_mut().fill", rows * 3 * width).by(32),
-                total("matching/best.rs", "for (second, &first)", rows * 3 * width / 2).by(4),
+                total("matching/best.rs", "for (second, &first)", rows * 3 * width / 2).by(4).written(16),
                 total(
                     "matching/mod.rs",
                     "if run.is_empty() && window == || search.follows = || loop {",
@@ -79,26 +81,26 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                         + u64::from(settings.wide_window_width) * (chunks - narrow_chunks),
                 )
                 .by(3),
-                total("arch/decide.rs", "for ((out, &enter), &leave)", narrow + wide).by(4),
+                total("arch/decide.rs", "for ((out, &enter), &leave)", narrow + wide).by(4).written(8),
                 total("arch/decide.rs", "*out = sum", narrow + wide).by(2),
                 total("arch/decide.rs", "*weak = u8::from(", decided).by(16),
                 total("arch/decide.rs", "for (number, (decided, untold))", (narrow + wide) / 16 + chunks),
                 each(
                     "arch/decide.rs",
                     "for (((offset, &farther), &best), &nearer) in all then *offset = refine_small",
-                    16 / 2,
-                ),
-                each(
-                    "arch/decide.rs",
-                    "for (((offset, &farther), &best), &nearer) in all then *offset = refine(",
-                    16 / 2,
-                ),
-                each("arch/decide.rs", "for i in 0..PART", 16 / 2),
+                    16,
+                )
+                .by(2)
+                .written(6),
+                each("arch/decide.rs", "for (((offset, &farther), &best), &nearer) in all then *offset = refine(", 16)
+                    .by(2)
+                    .written(6),
+                each("arch/decide.rs", "for i in 0..PART || decided[i] = ", 16).by(2),
                 total("arch/decide.rs", "for ((out, weak), (&decided, &untold))", narrow + wide),
                 total("arch/decide.rs", "for (start, out) in (first..end)", narrow_chunks),
                 total("arch/decide.rs", "for (disparity, pixel) in || *disparity = ((pixel.bits()", narrow).by(4),
                 total("arch/decide.rs", "for ((back, &disparity), x)", 64 * narrow_chunks).by(4),
-                total("arch/decide.rs", "for (pixel, (&disparity, &back))", narrow).by(4),
+                total("arch/decide.rs", "for (pixel, (&disparity, &back))", narrow).by(4).written(8),
                 // The search, pixel by pixel and block by block.
                 outermost("fencepost_core::arch::thumb::search::search_keys", narrow),
                 outermost("fencepost_core::arch::thumb::search::search_costs", wide),
@@ -119,7 +121,8 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 total("arch/thumb/search.rs", "places.clone().find(", wide * 8).early(4),
                 unwritten("fencepost_core::matching::Matcher::pass", chunks + 2 * rows),
             ],
-            library(32, width / 4, 0),
+            // Rows, and the sums of all columns of nine pictures and strips that begin.
+            library([32, width / 4], [9 * (width * disparities / 2 + width), 0]),
         ]
         .concat(),
         calls: vec![
