@@ -147,9 +147,10 @@ fn detect(detector: &mut Whole, stage: &str, numbers: &[u32; 12], pair: [&'stati
     if detector.configure(&settings, &calibration(stage, numbers), &mount).is_err() {
         fail("the detector cannot be configured");
     }
-    // Larger pictures show whatever lies in the memory.
+    // Larger pictures show whatever lies in the memory, left and right something else, so that strips are matched the other way round.
     let scale = scale(stage, numbers);
-    let pair = if scale > 1 { [memory(); 2] } else { pair };
+    let apart = memory().get(PIXELS * 23 + 7..).unwrap_or_default();
+    let pair = if scale > 1 { [memory(), apart] } else { pair };
     let pixels = scale * scale * PIXELS;
     let pictures =
         pair.map(|all| Picture::packed(all.get(..pixels).unwrap_or_default(), scale * WIDTH, scale * HEIGHT));
