@@ -33,8 +33,6 @@ pub(super) struct Fact {
     pub(super) by: usize,
     /// Reads or writes of its line that its code has at least: those of so many steps.
     pub(super) written: usize,
-    /// How often it is entered for a frame.
-    pub(super) entered: Option<u64>,
     /// Loops that take so many steps together, by a name that [`Stage::groups`] has.
     pub(super) group: Option<&'static str>,
     /// Whether it is told of every stage, and need not be in each.
@@ -55,11 +53,6 @@ impl Fact {
 
     const fn by(mut self, by: usize) -> Self {
         (self.by, self.written) = (by, by);
-        self
-    }
-
-    const fn entered(mut self, times: u64) -> Self {
-        self.entered = Some(times);
         self
     }
 
@@ -91,27 +84,11 @@ pub(super) struct Stage {
 }
 
 const fn total(file: &'static str, text: &'static str, more: u64) -> Fact {
-    Fact {
-        at: At::Line(file, text),
-        most: Most { each: 0, more },
-        by: 1,
-        written: 1,
-        entered: None,
-        group: None,
-        is_shared: false,
-    }
+    Fact { at: At::Line(file, text), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 const fn each(file: &'static str, text: &'static str, each: u64) -> Fact {
-    Fact {
-        at: At::Line(file, text),
-        most: Most { each, more: 0 },
-        by: 1,
-        written: 1,
-        entered: None,
-        group: None,
-        is_shared: false,
-    }
+    Fact { at: At::Line(file, text), most: Most { each, more: 0 }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
@@ -129,7 +106,6 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
     let surfaces = shape.surfaces;
     let limit = shape.wire_runs.min(cells);
     let terrain_rows = 3 * height.div_ceil(2);
-    let groups_of_points = of("ground", "pixels") / 8 + terrain_rows;
     vec![
         Stage {
             name: "rectify",
@@ -197,16 +173,14 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                 vec![
                     total("map/builder.rs", "for (index, evidence) in", cells),
                     each("map/votes.rs", "for y0 in", tiles_down),
-                    total("map/votes.rs", "for x0 in", tiles),
-                    total("map/votes.rs", "for (common, surface) in", of("map", "surfaces")),
+                    total("map/votes.rs", "for x0 in || let found = self.surfaces.of_tile || if found.is_empty()", tiles),
+                    total("map/votes.rs", "for (common, surface) in || *common = Common::of", of("map", "surfaces")),
                     total("map/votes.rs", "for y in y0", of("map", "rows_of_tiles")),
                     each("links.rs", "for (to, from) in piece.iter_mut().zip(pixels)", width % 32),
                     each("map/votes.rs", "for ((ray, first), step) in row.rays", 4),
                     total("map/votes.rs", "and_then(|i| self.common.get(i)) else { continue }", of("map", "runs")),
-                    total("map/votes.rs", ".fill(noise)", of("map", "noise_filled")).by(4),
-                    total("map/votes.rs", "for first in (0..TILE)", 4 * rows_of_tiles),
-                    each("map/votes.rs", "for k in 0..LANES", 8),
-                    each("ground/terrain.rs", "parts[k] = ", 8).by(2).written(4),
+                    total("map/votes.rs", ".fill(noise)", of("map", "noise_filled")).by(3),
+                    total("map/votes.rs", "for first in (0..TILE)", 32 * rows_of_tiles),
                     total("links.rs", "(bit != 0)", of("map", "votes")),
                     total("map/votes.rs", "evidence.height_dm = heights", 32 * rows_of_tiles).by(4),
                     each("map/shadow.rs", "pub(super) fn mark", 128),
@@ -330,20 +304,11 @@ Stage {
                     total("ground/terrain.rs", "for (says, surface) in", 3 * 16 * surfaces),
                     // With those tiles that have nothing to say, in place of their pixels.
                     total("ground/terrain.rs", "for x in (x0..end)", of("ground", "pixels")),
-                    // Eight points at a time, and what is left of a row.
-                    total("ground/terrain.rs", "for k in 0..N {", 8 * groups_of_points).entered(groups_of_points),
-                    total(
-                        "ground/terrain.rs",
-                        "patch.filter(|_| accepted[k]) || *weight += 1.0 || let Some(patch) = patch else || if (height_m - expected_m)",
-                        of("ground", "pixels"),
-                    )
-                    .entered(groups_of_points),
+                    total("ground/terrain.rs", "let table = self.surfaces.of_tile || if table.is_empty()", 2 * terrain_rows * width.div_ceil(32)),
                     total("ground/terrain.rs", "backs.find_map", of("ground", "patches_looked_back")),
                     total("ground/terrain.rs", "for (lift_m, (sum_m, weight)) in", 3 * 1600),
-                    // Rows and columns of patches, four at a time.
-                    each("ground/terrain.rs", "for rows in patches || for first in (0..ACROSS)", 10),
-                    each("ground/terrain.rs", "let mut lines: Lines<ACROSS> || let mut lines: Lines<AHEAD>", 40),
-                    each("ground/terrain.rs", "for (k, line) in lines || for (row, line) in patches", 40),
+                    // Rows and columns of patches, one at a time.
+                    each("ground/terrain.rs", "for rows in patches || for first in (0..ACROSS)", 40),
                     each("ground/terrain.rs", "for (before, own) in || for (patches, before) in", 40),
                 ],
                 library([40, 40], [3 * 2 * 1600 + 1600 + 2 * 2 * surfaces, 0]),
@@ -367,7 +332,6 @@ const fn sifts(text: &'static str, more: u64) -> Fact {
         most: Most { each: 1, more },
         by: 1,
         written: 1,
-        entered: None,
         group: None,
         is_shared: false,
     }
@@ -406,40 +370,16 @@ fn regions(shape: &Shape, times: u64, of: &dyn Fn(&str, &str) -> u64) -> Vec<Fac
 
 /// The loop of a function that no line leads back to the head of.
 const fn unwritten(name: &'static str, more: u64) -> Fact {
-    Fact {
-        at: At::Unwritten(name),
-        most: Most { each: 0, more },
-        by: 1,
-        written: 1,
-        entered: None,
-        group: None,
-        is_shared: false,
-    }
+    Fact { at: At::Unwritten(name), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 /// The first loop of a function, around all others.
 const fn outermost(name: &'static str, more: u64) -> Fact {
-    Fact {
-        at: At::LoopOf(name, 0),
-        most: Most { each: 0, more },
-        by: 1,
-        written: 1,
-        entered: None,
-        group: None,
-        is_shared: false,
-    }
+    Fact { at: At::LoopOf(name, 0), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 const fn function(name: &'static str, each: u64, more: u64) -> Fact {
-    Fact {
-        at: At::Function(name),
-        most: Most { each, more },
-        by: 1,
-        written: 1,
-        entered: None,
-        group: None,
-        is_shared: false,
-    }
+    Fact { at: At::Function(name), most: Most { each, more }, by: 1, written: 1, group: None, is_shared: false }
 }
 
 /// Fills of `bytes` in all, and of `words` beside.
@@ -449,7 +389,6 @@ fn fills(bytes: u64, words: u64) -> Vec<Fact> {
         most: Most { each: 0, more },
         by: 1,
         written: 1,
-        entered: None,
         group: None,
         is_shared: false,
     };
@@ -461,7 +400,7 @@ fn fills(bytes: u64, words: u64) -> Vec<Fact> {
 fn library([aligned, each]: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
     let fact = |name, nth, each, more| {
         let most = Most { each, more };
-        Fact { at: At::LoopOf(name, nth), most, by: 1, written: 1, entered: None, group: None, is_shared: true }
+        Fact { at: At::LoopOf(name, nth), most, by: 1, written: 1, group: None, is_shared: true }
     };
     let mut facts = Vec::new();
     for name in ["__aeabi_memclr", "__aeabi_memset"] {

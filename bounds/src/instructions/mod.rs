@@ -49,7 +49,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
     let mut program = Program::new(&functions, &begun);
     let mut used = BTreeSet::new();
     let mut together = BTreeMap::<usize, program::Sum>::new();
-    let (mut groups, mut entries) = (BTreeMap::<&str, program::Sum>::new(), BTreeMap::<usize, program::Sum>::new());
+    let mut groups = BTreeMap::<&str, program::Sum>::new();
     let mut loops = 0;
     let calls = program.calls();
     for (&at, graph) in &functions {
@@ -79,9 +79,6 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
                     "a round of the loop at {address:#x} is not {by} steps: {times} reads or writes, not {written}: {place}"
                 ));
             }
-            if stage.facts[number].entered.is_some() {
-                entries.entry(number).or_default().extend(entered.iter().copied());
-            }
             if let Some(group) = stage.facts[number].group {
                 let steps = rounds.iter().map(|(count, factor)| (*count, factor * by as f64));
                 groups.entry(group).or_default().extend(steps);
@@ -104,9 +101,6 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
             faults.push(format!("no calls of {name}"));
         }
         program.limit(sum, *most);
-    }
-    for (number, sum) in entries {
-        program.limit(sum, stage.facts[number].entered.unwrap_or_default());
     }
     for (name, most) in &stage.groups {
         program.limit(groups.remove(name).unwrap_or_default(), *most);
