@@ -5,7 +5,7 @@ use std::{fmt, path::Path};
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::figures::{Figures, Rows};
+use crate::figures::{Figures, Rows, instruction_rows};
 
 /// The file.
 #[derive(Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -20,6 +20,8 @@ pub(crate) struct Budget {
     work: Rows,
     /// Bytes.
     stack: Rows,
+    /// Instructions for a frame on a Cortex-M7.
+    pub(crate) instructions: Rows,
     /// Calls of panics in the checked image, and entries from which one can be reached.
     panics: Rows,
 }
@@ -66,6 +68,7 @@ impl Budget {
             bus: figures.bus.clone(),
             work: figures.work.clone(),
             stack: figures.stack.as_ref().map(|stack| stack.depths.clone()).unwrap_or_default(),
+            instructions: figures.instructions.as_deref().map(instruction_rows).unwrap_or_default(),
             panics: figures.panics.as_ref().map(|panics| panics.rows()).unwrap_or_default(),
         }
     }
@@ -95,6 +98,10 @@ impl Budget {
                 }
             }
             None => findings.notes.push("NOT RUN: stack: no --image was given".to_owned()),
+        }
+        match &figures.instructions {
+            Some(bounds) => findings.compare("instructions", &self.instructions, &instruction_rows(bounds)),
+            None => findings.notes.push("NOT RUN: instructions: no --image was given".to_owned()),
         }
         match &figures.panics {
             Some(panics) => findings.compare("panics", &self.panics, &panics.rows()),

@@ -8,6 +8,7 @@ use fencepost_core::detector::Capacities;
 use crate::{
     bus,
     image::{Analysis, Image},
+    instructions::{self, Bound},
     memory::{self, Formula, Layout},
     work::{Shape, StageWork},
 };
@@ -28,6 +29,8 @@ pub(crate) struct Figures {
     pub(crate) stages: Vec<(&'static str, Vec<StageWork>)>,
     /// From the image; `None` if there is none.
     pub(crate) stack: Option<Stack>,
+    /// Instructions of the stages, from the image; `None` if there is none.
+    pub(crate) instructions: Option<Vec<Bound>>,
     /// Calls of panics, by function; `None` without an image.
     pub(crate) panics: Option<Panics>,
     /// What must not be, whatever the budget.
@@ -64,6 +67,7 @@ impl Figures {
             memory: memory_rows(&layouts),
             bus: bus::rows().into_iter().collect(),
             stack: None,
+            instructions: None,
             panics: None,
             faults: memory_faults(&layouts, &formulas),
             layouts,
@@ -101,7 +105,18 @@ impl Figures {
         let way = deepest.1.map(|start| analysis.deepest_way(start)).unwrap_or_default();
         let deepest = way.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)).collect();
         self.stack = Some(Stack { depths, deepest });
+        let (width, height, disparities) = instructions::SIZE;
+        let (bounds, faults) = instructions::bounds(image, &Shape::of(width, height, disparities));
+        self.faults.extend(faults);
+        self.instructions = Some(bounds);
     }
+}
+
+/// Rows for the budget: instructions for a frame, by stage.
+pub(crate) fn instruction_rows(bounds: &[Bound]) -> Rows {
+    let (width, height, disparities) = instructions::SIZE;
+    let name = |bound: &Bound| format!("{width}x{height}x{disparities}.{}", bound.stage);
+    bounds.iter().map(|bound| (name(bound), bound.instructions)).collect()
 }
 
 fn memory_rows(layouts: &[(&'static str, Layout)]) -> Rows {

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt, path::Path};
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-use crate::{bus, work::Shape};
+use crate::{bus, instructions::Bound, work::Shape};
 
 /// What a platform takes.
 #[derive(Debug, Deserialize)]
@@ -81,18 +81,24 @@ impl Platform {
         Ok(platform)
     }
 
-    /// The worst case: a picture that comes just after the detector has begun with the one before, if that can be.
+    /// The worst case: a picture that comes just after the detector has begun with the one before, if that can be. Stages that have a
+    /// bound take that instead of what was measured.
     ///
     /// # Errors
     /// A format that does not exist.
-    pub(crate) fn latency(&self) -> Result<Latency> {
+    pub(crate) fn latency(&self, bounds: &[Bound]) -> Result<Latency> {
         let Camera { period_us, exposure_us, transfer_us } = self.camera;
         let Some((_, wire)) = bus::formats().into_iter().find(|(name, _)| *name == self.bus.format) else {
             bail!("bus.format is {:?}, neither classic nor fd", self.bus.format);
         };
         let rate = self.processor.clock_hz as f64 * self.processor.instructions_per_cycle;
         let us = |instructions: u64| (instructions as f64 * 1.0e6 / rate).ceil() as u64;
-        let processing_us: u64 = self.instructions.values().copied().map(us).sum();
+        let stages: Vec<_> = Shape::of(128, 96, 16).stages().into_iter().map(|stage| stage.stage).collect();
+        let of_stage = |stage: &str| match bounds.iter().find(|bound| bound.stage == stage) {
+            Some(bound) => ("bounded", us(bound.instructions)),
+            None => ("measured", us(self.instructions.get(stage).copied().unwrap_or_default())),
+        };
+        let processing_us: u64 = stages.iter().map(|stage| of_stage(stage).1).sum();
         let scan_us = bus::scan_us(&wire, self.bus.bit_rate)
             + (self.bus.other_bits * 1_000_000).div_ceil(u64::from(self.bus.bit_rate));
         // While a frame is worked on no other is; the newest that came meanwhile is next.
@@ -104,10 +110,9 @@ impl Platform {
             ("transfer".to_owned(), "given", transfer_us),
             ("waiting for the frame before".to_owned(), "derived", waiting_us),
         ];
-        let stages = Shape::of(128, 96, 16).stages();
         parts.extend(stages.iter().map(|stage| {
-            let instructions = self.instructions.get(stage.stage).copied().unwrap_or_default();
-            (stage.stage.to_owned(), "measured", us(instructions))
+            let (known, us) = of_stage(stage);
+            ((*stage).to_owned(), known, us)
         }));
         parts.push(("waiting for the scan before".to_owned(), "derived", queued_us));
         parts.push((format!("scan on the bus, {} at {} bit/s", self.bus.format, self.bus.bit_rate), "proven", scan_us));
@@ -151,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_example_adds_up() {
-        let latency = Platform::parse(EXAMPLE).unwrap().latency().unwrap();
+        let latency = Platform::parse(EXAMPLE).unwrap().latency(&[]).unwrap();
         // 184 096 280 instructions, each stage rounded up to a microsecond.
         assert_eq!(latency.processing_us, 383_538);
         assert_eq!(latency.whole_us(), 10_000 + 33_000 + latency.processing_us + 56_430);
@@ -159,9 +164,17 @@ mod tests {
     }
 
     #[test]
+    fn a_bound_is_taken_instead_of_what_was_measured() {
+        let bound = Bound { stage: "map", instructions: 48_000_000, loops: 1 };
+        let latency = Platform::parse(EXAMPLE).unwrap().latency(&[bound]).unwrap();
+        assert_eq!(latency.processing_us, 383_538 - 60_989 + 100_000);
+        assert!(latency.to_string().contains("100.000  bounded   map"), "{latency}");
+    }
+
+    #[test]
     fn what_is_too_slow_waits_and_is_told() {
         let fast = EXAMPLE.replace("period_us = 1_000_000", "period_us = 50_000");
-        let latency = Platform::parse(&fast).unwrap().latency().unwrap();
+        let latency = Platform::parse(&fast).unwrap().latency(&[]).unwrap();
         assert_eq!(latency.whole_us(), 10_000 + 33_000 + 2 * latency.processing_us + 56_430);
         assert!(!latency.keeps_up());
         assert!(latency.to_string().contains("DOES NOT KEEP UP"));
@@ -173,7 +186,7 @@ mod tests {
         assert!(told(&EXAMPLE.replace("health = 18_924_040\n", "")).contains("instructions.health is missing"));
         assert!(told(&EXAMPLE.replace("health =", "healht = 1\nhealth =")).contains("instructions.healht is no stage"));
         assert!(told(&EXAMPLE.replace("= 1.0", "= 0.0")).contains("processor"));
-        let format = Platform::parse(&EXAMPLE.replace("\"classic\"", "\"lin\"")).unwrap().latency().unwrap_err();
+        let format = Platform::parse(&EXAMPLE.replace("\"classic\"", "\"lin\"")).unwrap().latency(&[]).unwrap_err();
         assert!(format.to_string().contains("\"lin\""));
     }
 }

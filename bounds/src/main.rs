@@ -5,10 +5,12 @@ mod budget;
 mod bus;
 mod figures;
 mod image;
+mod instructions;
 mod latency;
 mod memory;
 mod painted;
 mod report;
+mod taken;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -51,6 +53,9 @@ enum Command {
         /// What the platform takes; bounds/platforms has an example.
         #[arg(long)]
         platform: PathBuf,
+        /// An image: stages take what its machine code takes at most, and not what was measured.
+        #[arg(long)]
+        image: Option<PathBuf>,
     },
     /// Compares the stack that an image was seen to take with what its code can take; the exit status is 1 if it took more, or too
     /// little for the bound to say much.
@@ -61,6 +66,19 @@ enum Command {
         /// What it printed, with lines `stack NAME BYTES`.
         #[arg(long)]
         said: PathBuf,
+    },
+    /// Compares the instructions that the worst pictures were seen to take with what the code can take; the exit status is 1 if a stage
+    /// took more, or too little for the bound to say much.
+    Taken {
+        /// The image that ran; stages whose functions it does not have are looked up in the budget.
+        #[arg(long)]
+        image: PathBuf,
+        /// What it printed, with lines `taken STAGE INSTRUCTIONS`.
+        #[arg(long)]
+        said: PathBuf,
+        /// The budget.
+        #[arg(long, default_value = "bounds/budget.toml")]
+        budget: PathBuf,
     },
     /// Runs the pictures that cost the most against the bounds of the work, and looks for worse ones; the exit status is 1 if a bound
     /// is exceeded, or says little because nothing comes near to it.
@@ -78,6 +96,9 @@ enum Command {
         /// Only one stage.
         #[arg(long)]
         stage: Option<String>,
+        /// Writes the pictures that are known for `fencepost-worst` in bounds/image.
+        #[arg(long)]
+        inputs: Option<PathBuf>,
         /// Keeps what was found.
         #[arg(long)]
         write: bool,
@@ -129,8 +150,10 @@ fn run(cli: &Cli) -> Result<bool> {
             print!("{findings}");
             Ok(findings.are_good())
         }
-        Command::Latency { platform } => {
-            let latency = latency::Platform::read(platform)?.latency()?;
+        Command::Latency { platform, image } => {
+            let figures = image.as_deref().map(|image| Figures::find(Some(image), None)).transpose()?;
+            let bounds = figures.and_then(|figures| figures.instructions).unwrap_or_default();
+            let latency = latency::Platform::read(platform)?.latency(&bounds)?;
             print!("{latency}");
             Ok(latency.keeps_up())
         }
@@ -139,11 +162,20 @@ fn run(cli: &Cli) -> Result<bool> {
             print!("{painted}");
             Ok(painted.is_good())
         }
+        Command::Taken { image, said, budget } => {
+            let taken = taken::Taken::of(image, said, &budget::Budget::read(budget)?)?;
+            print!("{taken}");
+            Ok(taken.is_good())
+        }
         #[cfg(feature = "search")]
-        Command::Search { worst, rounds, seed, stage, write } => {
+        Command::Search { worst, rounds, seed, stage, inputs, write } => {
             println!("seed {seed}");
             let (text, good, found) = search::search(&search::Worst::read(worst)?, *rounds, *seed, stage.as_deref());
             print!("{text}");
+            if let Some(inputs) = inputs {
+                let bytes = search::inputs(&search::Worst::read(worst)?);
+                std::fs::write(inputs, bytes).with_context(|| format!("cannot write {}", inputs.display()))?;
+            }
             if *write {
                 std::fs::write(worst, found.to_toml()?).with_context(|| format!("cannot write {}", worst.display()))?;
             }

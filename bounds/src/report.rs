@@ -5,6 +5,7 @@ use std::fmt::Write;
 use crate::{
     bus::{self, BIT_RATES, FD_RATES, SCAN_RATES_HZ},
     figures::{Figures, Panics, Stack},
+    instructions::Bound,
     work::StageWork,
 };
 
@@ -16,6 +17,10 @@ pub(crate) fn text(figures: &Figures) -> String {
     text += &figures.stack.as_ref().map_or_else(
         || "\nSTACK: not looked at; --image takes what bounds/entries/build has linked\n".to_owned(),
         stack,
+    );
+    text += &figures.instructions.as_deref().map_or_else(
+        || "\nINSTRUCTIONS: not looked at; --image takes what bounds/entries/build has linked\n".to_owned(),
+        instructions,
     );
     text += &figures.panics.as_ref().map_or_else(
         || "\nPANICS: not looked at; --checked takes what bounds/entries/build has linked\n".to_owned(),
@@ -112,6 +117,23 @@ fn stack(stack: &Stack) -> String {
     rows.iter().for_each(|(name, bytes)| text += &format!("{bytes:>7}  {name}\n"));
     text += "the deepest way, with the bytes of each function:\n";
     stack.deepest.iter().for_each(|(name, bytes)| text += &format!("{bytes:>7}  {name}\n"));
+    text
+}
+
+/// Instructions for a frame, and what they take where each cycle has one.
+fn instructions(bounds: &[Bound]) -> String {
+    let (width, height, disparities) = crate::instructions::SIZE;
+    let mut text = format!(
+        "\nINSTRUCTIONS for a frame of {width} x {height} x {disparities} on a Cortex-M7 with the default settings, at most;\n\
+         milliseconds at 480 MHz, if there were one for each cycle\n"
+    );
+    for Bound { stage, instructions, loops } in bounds {
+        let ms = *instructions as f64 / 480.0e3;
+        text += &format!("{instructions:>12}  {ms:>7.1} ms  {stage}, in {loops} loops of its machine code\n");
+    }
+    let stages = crate::work::Shape::of(width, height, disparities).stages();
+    let missing = stages.iter().filter(|work| bounds.iter().all(|bound| bound.stage != work.stage));
+    missing.for_each(|work| text += &format!("{:>12}  {:>7}     {}\n", "none", "", work.stage));
     text
 }
 

@@ -97,7 +97,7 @@ impl Shape {
     }
 
     /// Rows that go into the matcher, beside those of the picture, to be matched the other way round.
-    fn exchanged_rows(&self) -> u64 {
+    pub fn exchanged_rows(&self) -> u64 {
         EXCHANGED * (2 * self.margins()[1] + 1)
     }
 

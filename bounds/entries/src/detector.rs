@@ -2,7 +2,8 @@
 
 use fencepost_core::{
     arch::Backend,
-    detector::{DetectError, Detection, Detector},
+    bands::{Job, Workers},
+    detector::{Band, DetectError, Detection, Detector},
     disparity::{DisparityPicture, DisparityPixel},
     error::ConfigError,
     geometry::{DepthTable, Mount, Place, Rays, RectifiedPair, StereoCalibration, VehicleFrame},
@@ -61,6 +62,30 @@ fn entry_detector_detect<'a>(
     right: &Picture<'_>,
 ) -> Result<&'a Detection<OBSTACLES, CELLS>, DetectError> {
     detector.detect(left, right, &mut ())
+}
+
+#[unsafe(no_mangle)]
+fn entry_detector_detect_in_bands<'a>(
+    detector: &'a mut Whole,
+    pictures: &[Picture<'_>; 2],
+    bands: &mut [Band<WIDTH, DISPARITIES, CELLS>],
+    order: &[u8],
+) -> Result<&'a Detection<OBSTACLES, CELLS>, DetectError> {
+    detector.detect_in_bands(&pictures[0], &pictures[1], bands, &mut InOrder(order), &mut ())
+}
+
+/// Does the jobs that it is told of, on its own stack, as the first core of several does with its share: not all of them, and some
+/// twice, as it may be.
+struct InOrder<'a>(&'a [u8]);
+
+impl Workers for InOrder<'_> {
+    fn run<J: Job>(&mut self, jobs: &mut [J]) {
+        for &at in self.0 {
+            if let Some(job) = jobs.get_mut(usize::from(at)) {
+                job.run();
+            }
+        }
+    }
 }
 
 #[unsafe(no_mangle)]

@@ -12,6 +12,7 @@ mod detector;
     feature = "plant-recursion",
     feature = "plant-indirect-call",
     feature = "plant-deep-stack",
+    feature = "plant-loop",
     feature = "plant-unbounded-stack",
     feature = "plant-allocator"
 ))]

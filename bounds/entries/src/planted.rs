@@ -25,6 +25,14 @@ fn entry_planted_indirect_call(each: &mut dyn FnMut(u32) -> u32) -> u32 {
     each(1).wrapping_add(each(2))
 }
 
+/// A loop of which nobody knows how often it goes round.
+#[cfg(feature = "plant-loop")]
+pub(crate) fn look_at_each(cells: &[fencepost_core::map::Cell]) {
+    for cell in cells {
+        core::hint::black_box(cell);
+    }
+}
+
 /// 9 KiB on the stack.
 #[cfg(feature = "plant-deep-stack")]
 #[unsafe(no_mangle)]

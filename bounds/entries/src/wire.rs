@@ -48,6 +48,8 @@ fn entry_wire_encode(
     scan: &Scan<'_>,
     out: &mut VecView<Frame>,
 ) -> Result<EncodeReport, OutputFull> {
+    #[cfg(feature = "plant-loop")]
+    crate::planted::look_at_each(scan.cells);
     encoder.encode(scan, out)
 }
 

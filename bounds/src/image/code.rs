@@ -6,7 +6,7 @@ use anyhow::{Context, Result, anyhow};
 use capstone::{
     arch::{
         ArchDetail, BuildsCapstone, BuildsCapstoneExtraMode, DetailsArchInsn,
-        arm::{ArchExtraMode, ArchMode, ArmCC, ArmOperand, ArmOperandType, ArmReg},
+        arm::{ArchExtraMode, ArchMode, ArmCC, ArmInsn, ArmOperand, ArmOperandType, ArmReg},
     },
     {Capstone, RegId},
 };
@@ -84,6 +84,25 @@ impl Code {
         let before = self.instructions.range(..address).rev().take(4);
         let (_, it) = before.into_iter().find(|(_, before)| before.mnemonic.starts_with("it"))?;
         self.at(it.next())
+    }
+
+    /// Where the table of a jump lies: right behind it, or where the instruction before has made a register point to.
+    pub(crate) fn base_of_table(&self, jump: &Instruction) -> Option<u32> {
+        if jump.names_memory_at(PC) {
+            return Some(jump.next());
+        }
+        let (_, before) = self.instructions.range(..jump.address).next_back()?;
+        let is_behind_it = before.next() == jump.address && jump.names_memory_at(before.register(0)?);
+        // `adr r5, #8`, which the disassembler may read as `addw r5, pc, #8`.
+        let distance = match ArmInsn::from(before.id) {
+            ArmInsn::ARM_INS_ADR => before.immediate(1)?,
+            ArmInsn::ARM_INS_ADD | ArmInsn::ARM_INS_ADDW if before.register(1) == Some(PC) => before.immediate(2)?,
+            _ => return None,
+        };
+        if !is_behind_it {
+            return None;
+        }
+        u32::try_from(i64::from((before.address + 4) & !3) + distance).ok()
     }
 
     /// The bytes from `address` to where code begins again.

@@ -232,7 +232,7 @@ impl<'a> Analysis<'a> {
                 if id != ArmInsn::ARM_INS_B || (instruction.is_conditional() && condition.is_none()) {
                     left.push(((next, None), stack.clone()));
                 }
-                if self.is_inside(start, target) {
+                if self.image.is_inside(start, target) {
                     left.push(((target, None), stack.clone()));
                 } else if self.call(start, instruction, target, stack, depth) {
                     depth.returns = true;
@@ -245,7 +245,7 @@ impl<'a> Analysis<'a> {
                 }
             }
             ArmInsn::ARM_INS_TBB | ArmInsn::ARM_INS_TBH => {
-                let Some(targets) = self.table(start, instruction, id == ArmInsn::ARM_INS_TBH) else {
+                let Some(targets) = table(self.image, start, instruction, id == ArmInsn::ARM_INS_TBH) else {
                     self.flaw(start, instruction.address, FlawKind::NoTable);
                     return;
                 };
@@ -283,27 +283,23 @@ impl<'a> Analysis<'a> {
         }
         called.returns
     }
+}
 
-    fn is_inside(&self, start: u32, target: u32) -> bool {
-        self.image.functions.get(&start).is_some_and(|function| (start..function.end).contains(&target))
-    }
-
-    /// Where a table of jumps leads: half the distances from its start, in bytes or half words. It ends where code goes on, or before
-    /// that with what leads to no code: padding, and constants behind the table. A constant that happens to lead to code is followed
-    /// as well, which can only add to the bound.
-    fn table(&self, start: u32, instruction: &Instruction, is_wide: bool) -> Option<Vec<u32>> {
-        let from = instruction.next();
-        let bytes = self.image.code.table_at(from)?;
-        let distances: Vec<u32> = if is_wide {
-            bytes.chunks_exact(2).map(|pair| u32::from(pair[0]) | u32::from(pair[1]) << 8).collect()
-        } else {
-            bytes.iter().map(|byte| u32::from(*byte)).collect()
-        };
-        let targets = distances.into_iter().map(|distance| from + 2 * distance);
-        let is_code = |target: &u32| self.is_inside(start, *target) && self.image.code.at(*target).is_some();
-        let targets = targets.take_while(is_code).collect::<Vec<_>>();
-        (!targets.is_empty()).then_some(targets)
-    }
+/// Where a table of jumps leads: half the distances from the jump on, in bytes or half words. It ends where code goes on, or before that
+/// with what leads to no code: padding, and constants behind the table. A constant that happens to lead to code is followed as well,
+/// which can only add to the bound.
+pub(super) fn table(image: &Image, start: u32, instruction: &Instruction, is_wide: bool) -> Option<Vec<u32>> {
+    let from = instruction.next();
+    let bytes = image.code.table_at(image.code.base_of_table(instruction)?)?;
+    let distances: Vec<u32> = if is_wide {
+        bytes.chunks_exact(2).map(|pair| u32::from(pair[0]) | u32::from(pair[1]) << 8).collect()
+    } else {
+        bytes.iter().map(|byte| u32::from(*byte)).collect()
+    };
+    let targets = distances.into_iter().map(|distance| from + 2 * distance);
+    let is_code = |target: &u32| image.is_inside(start, *target) && image.code.at(*target).is_some();
+    let targets = targets.take_while(is_code).collect::<Vec<_>>();
+    (!targets.is_empty()).then_some(targets)
 }
 
 #[cfg(test)]
@@ -312,10 +308,11 @@ mod tests {
     use crate::image::{
         Function,
         code::{Code, Kind},
+        source::Lines,
     };
 
     /// Functions as an assembler makes them; their names, and the first addresses after them.
-    const CODE: [u16; 52] = [
+    const CODE: [u16; 62] = [
         // fixed: push {r4, lr}; sub sp, #16; bl saved; add sp, #16; pop {r4, pc}
         0xb510, 0xb084, 0xf000, 0xf802, 0xb004, 0xbd10,
         // saved: push {r7, lr}; vpush {d8, d9}; str lr, [sp, #-4]!; ldr lr, [sp], #4; vpop {d8, d9}; pop {r7, pc}
@@ -331,9 +328,11 @@ mod tests {
         0xb580, 0xe8df, 0xf000, 0x0402, 0x0004, 0xb090, 0xb010, 0xbd80, // variable: sub sp, sp, r0; bx lr
         0xebad, 0x0d00, 0x4770, // uneven: cbz r0, 1f; push {r4}; 1: bx lr
         0xb100, 0xb410, 0x4770,
+        // behind: push {r7, lr}; addw r5, pc, #8; tbb [r5, r0]; .byte 66, 67; .byte 2, 4; sub sp, #32; add sp, #32; pop {r7, pc}
+        0xb580, 0xf20f, 0x0508, 0xe8d5, 0xf000, 0x4342, 0x0402, 0xb088, 0xb008, 0xbd80,
     ];
 
-    const FUNCTIONS: [(&str, u32, u32); 8] = [
+    const FUNCTIONS: [(&str, u32, u32); 9] = [
         ("fixed", 0x0, 0xc),
         ("saved", 0xc, 0x20),
         ("circle", 0x20, 0x30),
@@ -342,15 +341,23 @@ mod tests {
         ("table", 0x4c, 0x5c),
         ("variable", 0x5c, 0x62),
         ("uneven", 0x62, 0x68),
+        ("behind", 0x68, 0x7c),
     ];
 
     fn image() -> Image {
         let bytes: Vec<u8> = CODE.iter().flat_map(|half| half.to_le_bytes()).collect();
-        let marks = BTreeMap::from([(0, Kind::Thumb), (0x52, Kind::Data), (0x56, Kind::Thumb)]);
+        let marks = BTreeMap::from([
+            (0, Kind::Thumb),
+            (0x52, Kind::Data),
+            (0x56, Kind::Thumb),
+            (0x72, Kind::Data),
+            (0x76, Kind::Thumb),
+        ]);
         let functions = FUNCTIONS.map(|(name, start, end)| (start, Function { name: name.to_owned(), end }));
         Image {
             functions: BTreeMap::from(functions),
             code: Code::disassemble(&[(0, &bytes)], &marks).unwrap(),
+            lines: Lines::default(),
             told: BTreeMap::from([(0, 24), (0xc, 28), (0x4c, 73)]),
             detector_bytes: None,
             allocators: Vec::new(),
@@ -381,6 +388,8 @@ mod tests {
     #[test]
     fn a_table_leads_to_all_of_its_places() {
         assert_eq!((found("table").0, found("table").1), (8 + 64, 72));
+        // The register points behind a word that is none of it.
+        assert_eq!(found("behind"), (8 + 32, 40, vec![]));
     }
 
     #[test]

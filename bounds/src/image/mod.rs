@@ -3,8 +3,14 @@
 mod code;
 mod effect;
 mod flow;
+mod graph;
+mod source;
 
 pub(crate) use flow::Analysis;
+#[cfg(test)]
+pub(crate) use graph::Block;
+pub(crate) use graph::{Graph, Loop};
+pub(crate) use source::{Line, plain};
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -26,6 +32,8 @@ pub(crate) struct Function {
 pub(crate) struct Image {
     functions: BTreeMap<u32, Function>,
     code: code::Code,
+    /// Where the code comes from.
+    pub(crate) lines: source::Lines,
     /// Frames as the compiler tells them, by function; empty if it was not asked to.
     told: BTreeMap<u32, u32>,
     /// Bytes of the symbol `DETECTOR`.
@@ -90,7 +98,8 @@ impl Image {
             Some(section) => told_frames(section.data().context("the sizes of the frames cannot be read")?)?,
             None => BTreeMap::new(),
         };
-        Ok(Self { functions, code, told, detector_bytes, allocators })
+        let lines = source::Lines::of(&file)?;
+        Ok(Self { functions, code, lines, told, detector_bytes, allocators })
     }
 
     /// Addresses of the entries, by name.
@@ -99,6 +108,24 @@ impl Image {
             .iter()
             .filter(|(_, function)| function.name.starts_with(ENTRY))
             .map(|(address, function)| (*address, function.name.as_str()))
+    }
+
+    /// Whether an address lies in the function at `start`.
+    fn is_inside(&self, start: u32, address: u32) -> bool {
+        self.functions.get(&start).is_some_and(|function| (start..function.end).contains(&address))
+    }
+
+    /// The mnemonic of an instruction that reads or writes memory.
+    pub(crate) fn memory_mnemonic(&self, address: u32) -> Option<&str> {
+        let instruction = self.code.at(address)?;
+        let is_memory =
+            ["ldr", "str", "vldr", "vstr", "ldm", "stm"].iter().any(|name| instruction.mnemonic.starts_with(name));
+        is_memory.then_some(instruction.mnemonic.as_str())
+    }
+
+    /// The address of a function, by its name.
+    pub(crate) fn address(&self, name: &str) -> Option<u32> {
+        self.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
     }
 
     /// The name of the function at an address.

@@ -76,6 +76,25 @@ pub fn search(kept: &Worst, rounds: usize, seed: u32, only: Option<&str>) -> (St
     (text, good, worst)
 }
 
+/// The pictures that are kept, for pictures of 320 x 240, as bounds/image/src/worst.rs reads them: for each the name of its stage, 16
+/// bytes, its numbers, and the pair of pictures, the disparities or the cells that the stage begins with.
+pub fn inputs(kept: &Worst) -> Vec<u8> {
+    let (size, largest) = ((320, 240), 16 * 47);
+    let mut bytes = Vec::new();
+    for (stage, genome) in kept.0.iter().flat_map(|(stage, genomes)| genomes.iter().map(move |genome| (stage, genome)))
+    {
+        bytes.extend(stage.bytes().chain(std::iter::repeat(0)).take(16));
+        bytes.extend(genome.numbers.iter().flat_map(|number| number.to_le_bytes()));
+        match stage.as_str() {
+            "rectify" | "match" | "health" => bytes.extend(genome.pair(size).concat()),
+            "wire" => bytes.extend(rig::states(genome)),
+            _ => bytes.extend(genome.disparities(size, largest).iter().flat_map(|steps| steps.to_le_bytes())),
+        }
+    }
+    bytes.extend([0; 16]);
+    bytes
+}
+
 /// Whether a loop belongs to the stage: surfaces are joined for the ground and for the obstacles.
 fn belongs(stage: &str, of: &str) -> bool {
     of == stage || (of == "regions" && (stage == "ground" || stage == "obstacles"))

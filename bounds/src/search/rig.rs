@@ -236,27 +236,8 @@ fn encode(genome: &Genome) -> Taken {
         y_count: 50,
     };
     let cell = |state| Cell { state, ..Cell::default() };
-    let states = [CellState::Unknown(UnknownReason::NoMatch), CellState::Free, CellState::Obstacle].map(cell);
-    let mut random = Random::seeded(n[2]);
-    let (period, free_rows) = (1 + (n[3] % 4) as usize, (n[4] % 51) as usize);
-    let mut cells: std::vec::Vec<Cell> = (0..geometry.len())
-        .map(|index| {
-            let (row, column) = (index / 50, index % 50);
-            match n[5] % 3 {
-                0 => states[if (row + column) % (period + 1) == 0 { 1 + usize::from(row >= free_rows) } else { 0 }],
-                1 => states[1 + (column + row) % 2],
-                _ => states[random.below(3) as usize],
-            }
-        })
-        .collect();
-    for &seed in &genome.patches {
-        let mut random = Random::seeded(seed);
-        let (first, count) = (random.below(2500) as usize, 1 + random.below(60) as usize);
-        let kind = random.below(4);
-        for (index, cell) in cells.iter_mut().enumerate().skip(first).take(count) {
-            *cell = states[if kind < 3 { kind as usize } else { 1 + index % 2 }];
-        }
-    }
+    let kinds = [CellState::Unknown(UnknownReason::NoMatch), CellState::Free, CellState::Obstacle].map(cell);
+    let cells: std::vec::Vec<Cell> = states(genome).into_iter().map(|state| kinds[usize::from(state)]).collect();
     let config = WireConfig::new(WireSettings::default()).expect("the defaults can be used");
     let mut encoder = ScanEncoder::<512>::new(config).expect("there is room");
     let mut frames: Vec<Frame, 256> = Vec::new();
@@ -272,4 +253,31 @@ fn encode(genome: &Genome) -> Taken {
     work::reset();
     encoder.encode(&scan, frames.as_mut_view()).expect("there is room");
     work::taken()
+}
+
+/// What is known of the cells: nothing, free, obstacle.
+pub(super) fn states(genome: &Genome) -> std::vec::Vec<u8> {
+    let n = &genome.numbers;
+    let mut random = Random::seeded(n[2]);
+    let (period, free_rows) = (1 + (n[3] % 4) as usize, (n[4] % 51) as usize);
+    let mut states: std::vec::Vec<u8> = (0..2500)
+        .map(|index| {
+            let (row, column) = (index / 50, index % 50);
+            match n[5] % 3 {
+                0 if (row + column) % (period + 1) == 0 => 1 + u8::from(row >= free_rows),
+                0 => 0,
+                1 => 1 + ((column + row) % 2) as u8,
+                _ => random.below(3) as u8,
+            }
+        })
+        .collect();
+    for &seed in &genome.patches {
+        let mut random = Random::seeded(seed);
+        let (first, count) = (random.below(2500) as usize, 1 + random.below(60) as usize);
+        let kind = random.below(4);
+        for (index, state) in states.iter_mut().enumerate().skip(first).take(count) {
+            *state = if kind < 3 { kind as u8 } else { 1 + (index % 2) as u8 };
+        }
+    }
+    states
 }

@@ -1,0 +1,229 @@
+//! The most instructions that a stage takes for a frame, from the machine code of an image: each block of it runs as often as the loops
+//! around it go round, and how often they do is known (`facts`). `docs/bounds.md` says what that proves.
+
+mod facts;
+mod program;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::{
+    image::{Graph, Image, Line, Loop, plain},
+    work::Shape,
+};
+use facts::{Fact, Most, Stage};
+use program::{Program, rounds};
+
+/// Width, height and disparities of the images whose machine code is looked at.
+pub(crate) const SIZE: (usize, usize, usize) = (320, 240, 48);
+
+/// What a stage takes at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Bound {
+    pub(crate) stage: &'static str,
+    pub(crate) instructions: u64,
+    /// Loops of its machine code.
+    pub(crate) loops: usize,
+}
+
+/// The bounds of all stages whose functions are in the image, and what keeps others from having one.
+pub(crate) fn bounds(image: &Image, shape: &Shape) -> (Vec<Bound>, Vec<String>) {
+    let (mut bounds, mut faults) = (Vec::new(), Vec::new());
+    for stage in facts::stages(shape) {
+        match bound(image, &stage) {
+            Ok(bound) => bounds.extend(bound),
+            Err(mut why) => faults.append(&mut why),
+        }
+    }
+    (bounds, faults)
+}
+
+/// The bound of a stage; `None` if the image has none of its functions.
+fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
+    let begun: BTreeMap<u32, u64> =
+        stage.entries.iter().filter_map(|(name, times)| Some((image.address(name)?, *times))).collect();
+    if begun.is_empty() {
+        return Ok(None);
+    }
+    let told = |what: String| format!("instructions {}: {what}", stage.name);
+    let (functions, mut faults) = functions(image, begun.keys().copied());
+    let mut program = Program::new(&functions, &begun);
+    let mut used = BTreeSet::new();
+    let mut together = BTreeMap::<usize, program::Sum>::new();
+    let mut groups = BTreeMap::<&str, program::Sum>::new();
+    let mut loops = 0;
+    let calls = program.calls();
+    for (&at, graph) in &functions {
+        let found = graph.loops();
+        loops += found.len();
+        let mut known = Vec::new();
+        for (nth, one) in found.iter().enumerate() {
+            let place = Place::of(image, at, nth, graph, one);
+            match stage.facts.iter().position(|fact| place.is(fact)) {
+                Some(number) => known.push((number, one)),
+                None => faults.push(format!("a loop without a bound: {place}")),
+            }
+        }
+        for &(number, one) in &known {
+            // Of a loop that the compiler has made two of, one within the other, a round begins at the outer head, or goes back to
+            // the inner one.
+            let is_inner = known
+                .iter()
+                .any(|&(other, outer)| other == number && outer.head != one.head && outer.blocks.contains(&one.head));
+            let (rounds, entered) = rounds(at, graph, one, is_inner, calls.get(&at).map_or(&[], Vec::as_slice));
+            let Fact { most: Most { each, more }, by, written, .. } = stage.facts[number];
+            let times = times_written(image, graph, &found, one, &stage.facts[number]);
+            if times < written {
+                let address = graph.blocks[one.head].instructions[0];
+                let place = stage.facts[number].place();
+                faults.push(format!(
+                    "a round of the loop at {address:#x} is not {by} steps: {times} reads or writes, not {written}: {place}"
+                ));
+            }
+            if let Some(group) = stage.facts[number].group {
+                let steps = rounds.iter().map(|(count, factor)| (*count, factor * by as f64));
+                groups.entry(group).or_default().extend(steps);
+            }
+            let rounds = rounds.into_iter().map(|(count, factor)| (count, factor * by as f64));
+            let entered = entered.into_iter().map(|(count, factor)| (count, -factor * each as f64));
+            let sum: program::Sum = rounds.chain(entered).collect();
+            used.insert(number);
+            if more == 0 {
+                program.limit(sum, 0);
+            } else {
+                together.entry(number).or_default().extend(sum);
+            }
+        }
+    }
+    for (name, most) in &stage.calls {
+        let of_name = functions.keys().filter(|at| plain(image.name(**at)) == *name);
+        let sum = of_name.filter_map(|at| calls.get(at)).flatten().map(|call| (*call, 1.0)).collect::<Vec<_>>();
+        if sum.is_empty() {
+            faults.push(format!("no calls of {name}"));
+        }
+        program.limit(sum, *most);
+    }
+    for (name, most) in &stage.groups {
+        program.limit(groups.remove(name).unwrap_or_default(), *most);
+    }
+    for (number, sum) in together {
+        program.limit(sum, stage.facts[number].most.more);
+    }
+    let idle = stage.facts.iter().enumerate().filter(|(number, fact)| !used.contains(number) && !fact.is_shared);
+    faults.extend(idle.map(|(_, fact)| format!("no loop for what is known of {}", fact.place())));
+    if !faults.is_empty() {
+        return Err(faults.into_iter().map(told).collect());
+    }
+    let Some(instructions) = program.most() else {
+        return Err(vec![told("the bounds of its loops do not bound it".to_owned())]);
+    };
+    Ok(Some(Bound { stage: stage.name, instructions, loops }))
+}
+
+/// How often a line stands in the code of a loop: its instructions that go to memory, which nothing is saved of.
+fn times_written(image: &Image, graph: &Graph, all: &[Loop], one: &Loop, fact: &Fact) -> usize {
+    let facts::At::Line(file, text) = fact.at else { return 1 };
+    let mut times = BTreeMap::<bool, usize>::new();
+    for block in own_blocks(all, one) {
+        for &address in &graph.blocks[block].instructions {
+            let Some(mnemonic) = image.memory_mnemonic(address) else { continue };
+            let lines = Chain::of(image, address);
+            // Wherever it was inlined from: what is written at the line may be a call.
+            let is_line = (0..lines.0.len()).any(|from| Chain(lines.0[from..].to_vec()).is(file, text));
+            if is_line {
+                *times.entry(mnemonic.contains("ld")).or_default() += 1;
+            }
+        }
+    }
+    times.into_values().max().unwrap_or(1)
+}
+
+/// Lines of the core that an instruction comes from, the innermost first: file, number, text and that of the next line.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Chain(Vec<(String, u32, String, String)>);
+
+impl Chain {
+    fn of(image: &Image, address: u32) -> Self {
+        let frames = image.lines.of_address(address);
+        let of_core = frames.iter().filter(|line| line.line != 0);
+        let line = |line: &Line| {
+            let file = line.core_file()?;
+            let [text, next] = [line.line, line.line + 1].map(|line| image.source(file, line));
+            Some((file.to_owned(), line.line, text, next))
+        };
+        Self(of_core.filter_map(line).collect())
+    }
+
+    fn is(&self, file: &str, meant: &str) -> bool {
+        let lines: Vec<_> = self.0.iter().map(|(_, _, text, next)| (text.clone(), next.clone())).collect();
+        self.0.first().is_some_and(|(of, ..)| of == file) && facts::is_meant(meant, &lines)
+    }
+}
+
+/// Blocks of a loop that belong to none within it.
+fn own_blocks<'a>(all: &'a [Loop], one: &'a Loop) -> impl Iterator<Item = usize> + 'a {
+    one.blocks.iter().copied().filter(move |block| {
+        let is_inner =
+            |other: &Loop| other.head != one.head && one.blocks.contains(&other.head) && other.blocks.contains(block);
+        !all.iter().any(is_inner)
+    })
+}
+
+/// The functions that can be reached, and what keeps ways through them from being known.
+fn functions(image: &Image, from: impl Iterator<Item = u32>) -> (BTreeMap<u32, Graph>, Vec<String>) {
+    let (mut functions, mut faults) = (BTreeMap::new(), Vec::new());
+    let mut left: Vec<u32> = from.collect();
+    while let Some(at) = left.pop() {
+        if functions.contains_key(&at) {
+            continue;
+        }
+        match Graph::of(image, at) {
+            Ok(graph) => {
+                left.extend(graph.blocks.iter().flat_map(|block| &block.calls));
+                functions.insert(at, graph);
+            }
+            Err(no) => faults.push(format!("{} at {:#x}: {}", image.name(at), no.address, no.why)),
+        }
+    }
+    (functions, faults)
+}
+
+/// Where a loop stands.
+struct Place {
+    address: u32,
+    /// The function of the image, and the how manieth of its loops it is.
+    function: String,
+    nth: usize,
+    /// What leads back to the head of the loop, as far as its line is known.
+    lines: BTreeSet<Chain>,
+}
+
+impl Place {
+    fn of(image: &Image, at: u32, nth: usize, graph: &Graph, one: &Loop) -> Self {
+        let chains = |addresses: &mut dyn Iterator<Item = u32>| -> BTreeSet<Chain> {
+            addresses.map(|address| Chain::of(image, address)).filter(|chain| !chain.0.is_empty()).collect()
+        };
+        let mut backs = one.backs.iter().filter_map(|back| graph.blocks[*back].instructions.last().copied());
+        let lines = chains(&mut backs);
+        let address = graph.blocks[one.head].instructions.first().copied().unwrap_or_default();
+        Self { address, function: plain(image.name(at)), nth, lines }
+    }
+
+    fn is(&self, fact: &Fact) -> bool {
+        match fact.at {
+            facts::At::Line(file, text) => self.lines.iter().any(|chain| chain.is(file, text)),
+            facts::At::Function(name) => self.function == name,
+            facts::At::Unwritten(name) => self.function == name && self.lines.is_empty(),
+            facts::At::LoopOf(name, nth) => self.function == name && self.nth == nth,
+        }
+    }
+}
+
+impl core::fmt::Display for Place {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:#x}, loop {} of {}", self.address, self.nth, self.function)?;
+        for (file, line, text, _) in self.lines.iter().filter_map(|chain| chain.0.first()) {
+            write!(f, "; {file}:{line}: {text}")?;
+        }
+        Ok(())
+    }
+}
