@@ -1,7 +1,8 @@
 //! What the receiver answers to a frame and what it counts, held against what was done to the frames by hand.
 
 use fencepost_core::wire::{
-    Abandoned, Frame, FrameFormat, Message, PacketError, ReceiveError, Received, ReceiverStatistics,
+    Abandoned, Frame, FrameFormat, MeaninglessValue, Message, OutputFull, PacketError, ReceiveError, Received,
+    ReceiverStatistics,
 };
 
 use super::{Encoder, Random, Receiver, SMALL, World, encoder, receiver};
@@ -113,6 +114,20 @@ fn what_is_refused_is_counted_by_its_reason() {
     assert_eq!(link.hear(&frames[0]), Ok(Received::Repeated));
     let expected = ReceiverStatistics { refused: 1, crc_errors: 1, repeated: 1, ..ReceiverStatistics::default() };
     assert_eq!(link.statistics(), expected);
+}
+
+#[test]
+fn a_refusal_says_why() {
+    for (error, text) in [
+        (ReceiveError::Packet(PacketError::WrongCrc), "the checksum does not fit"),
+        (ReceiveError::Packet(PacketError::WrongLength { expected: 8, found: 7 }), "the message has 8 bytes, 7 came"),
+        (ReceiveError::Packet(PacketError::WrongDataId), "the data id is not that of the identifier"),
+        (ReceiveError::Packet(PacketError::InvalidCounter), "the counter is 15, which is never sent"),
+        (ReceiveError::Value(MeaninglessValue("SectorCount")), "SectorCount has a value without a meaning"),
+    ] {
+        assert_eq!(error.to_string(), text);
+    }
+    assert_eq!(OutputFull.to_string(), "the output has no room for a scan's 8 fixed frames");
 }
 
 #[test]
