@@ -26,11 +26,10 @@ def outcome(folder):
     """Mutants of a module by what became of them; each is in one of the lists."""
     found = {}
     first, second = folder / "first" / "mutants.out", folder / "second" / "mutants.out"
-    for name in ("caught", "unviable"):
+    for name in ("caught", "timeout", "unviable"):
         found[name] = lines(first / f"{name}.txt") + lines(second / f"{name}.txt")
-    # The second run is the last word on what the first let live.
-    for name in ("missed", "timeout"):
-        found[name] = lines(second / f"{name}.txt")
+    # What the first run let live is what the second was for.
+    found["missed"] = lines(second / "missed.txt")
     return found
 
 
