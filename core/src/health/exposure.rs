@@ -95,14 +95,15 @@ impl RecentPictures {
 
 #[cfg(test)]
 mod tests {
-    use std::{vec, vec::Vec};
+    use std::vec::Vec;
 
     use super::*;
 
     /// The exposure of a picture of which these pixels are looked at, row by row; all others are `other`.
     fn exposure(rows: &[&[u8]], other: u8) -> Exposure {
         let (width, height) = (rows[0].len() * STEP - 1, rows.len() * STEP - 2);
-        let pixel = |y: usize, x: usize| if y % 4 == 0 && x % 4 == 0 { rows[y / 4][x / 4] } else { other };
+        let pixel =
+            |y: usize, x: usize| if y.is_multiple_of(4) && x.is_multiple_of(4) { rows[y / 4][x / 4] } else { other };
         let pixels: Vec<u8> = (0..height).flat_map(|y| (0..width).map(move |x| pixel(y, x))).collect();
         Exposure::of(&Picture::packed(&pixels, width, height).unwrap())
     }
@@ -114,7 +115,7 @@ mod tests {
             assert_eq!(found.mean, 120.0);
             assert!((found.dark_percent - 20.0).abs() < 1.0e-5 && (found.bright_percent - 30.0).abs() < 1.0e-5);
         }
-        let black = Exposure::of(&Picture::packed(&vec![0; 64], 8, 8).unwrap());
+        let black = Exposure::of(&Picture::packed(&[0; 64], 8, 8).unwrap());
         assert_eq!((black.mean, black.dark_percent, black.bright_percent), (0.0, 100.0, 0.0));
     }
 
