@@ -26,10 +26,12 @@ def outcome(folder):
     """Mutants of a module by what became of them; each is in one of the lists."""
     found = {}
     first, second = folder / "first" / "mutants.out", folder / "second" / "mutants.out"
+    alive = set(lines(first / "missed.txt"))
     for name in ("caught", "timeout", "unviable"):
-        found[name] = lines(first / f"{name}.txt") + lines(second / f"{name}.txt")
-    # What the first run let live is what the second was for.
-    found["missed"] = lines(second / "missed.txt")
+        found[name] = lines(first / f"{name}.txt") + [text for text in lines(second / f"{name}.txt") if text in alive]
+    # What the first run let live is what the second was for; it may have run others, since fields that are left out are not chosen by
+    # expressions.
+    found["missed"] = [text for text in lines(second / "missed.txt") if text in alive]
     return found
 
 
