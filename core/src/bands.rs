@@ -147,6 +147,14 @@ mod tests {
     }
 
     #[test]
+    fn the_callers_own_thread_does_every_job() {
+        let mut done = [0; 3];
+        let mut jobs = done.each_mut().map(|done| Ticket { work: Count(done), done: false });
+        OneThread.run(&mut jobs);
+        assert_eq!(done, [1; 3]);
+    }
+
+    #[test]
     fn all_work_is_done_once_whatever_the_workers_do() {
         for how in 0..4 {
             let mut done = [0; 5];

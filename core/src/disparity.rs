@@ -167,16 +167,16 @@ impl<'a> DisparityPicture<'a> {
         let mut without = [0u32; Reason::ALL.len()];
         // In short pieces counts fit 16 bits, as wide as the pixels.
         for piece in self.pixels.chunks(4096) {
-            let has_value = count(piece, |pixel| pixel.has_value());
+            let has_value = how_many(piece, |pixel| pixel.has_value());
             // No count exceeds that of the pixels of a picture, which is less than 2^32.
             with = with.wrapping_add(has_value);
             let mut known = has_value;
             for (without, reason) in without.iter_mut().zip(Reason::ALL).skip(1) {
-                let said = count(piece, |pixel| pixel == DisparityPixel::none(reason));
+                let said = how_many(piece, |pixel| pixel == DisparityPixel::none(reason));
                 *without = without.wrapping_add(said);
                 known = known.wrapping_add(said);
             }
-            let zero = count(piece, |pixel| pixel.bits() == 0);
+            let zero = how_many(piece, |pixel| pixel.bits() == 0);
             let outside = (piece.len() as u32).saturating_sub(known.wrapping_add(zero));
             for (reason, said) in [(Reason::OutOfRange, zero), (Reason::OutsideValidArea, outside)] {
                 without[reason as usize] = without[reason as usize].wrapping_add(said);
@@ -206,7 +206,7 @@ impl Steps for Count<'_> {
 
 /// How many of up to 2^16 - 1 pixels are as asked.
 #[inline(always)]
-fn count(pixels: &[DisparityPixel], is_so: impl Fn(DisparityPixel) -> bool) -> u32 {
+fn how_many(pixels: &[DisparityPixel], is_so: impl Fn(DisparityPixel) -> bool) -> u32 {
     u32::from(pixels.iter().fold(0u16, |count, &pixel| count.wrapping_add(u16::from(is_so(pixel)))))
 }
 

@@ -1,6 +1,6 @@
 //! All 65,536 pixels, and pictures of every shape.
 
-use std::vec::Vec;
+use std::{format, string::String, vec::Vec};
 
 use super::*;
 use crate::test_random::Random;
@@ -30,6 +30,20 @@ fn any_bits_are_a_disparity_or_a_reason() {
     for (code, reason) in Reason::ALL.into_iter().enumerate() {
         assert_eq!(reason as usize, code);
         assert_eq!(DisparityPixel::none(reason).get(), Err(reason));
+    }
+}
+
+#[test]
+fn reasons_are_called_as_in_the_code() {
+    for reason in Reason::ALL {
+        let mut name = String::new();
+        for letter in format!("{reason:?}").chars() {
+            if letter.is_uppercase() && !name.is_empty() {
+                name.push('_');
+            }
+            name.extend(letter.to_lowercase());
+        }
+        assert_eq!(reason.name(), name);
     }
 }
 

@@ -28,6 +28,7 @@ fn every_problem_names_the_field_and_the_mend() {
         (ConfigProblem::OverCapacity { needed: 9, capacity: 8 }, "a.b: needs 9, but this build has room for 8"),
         (ConfigProblem::NotARotation, "a.b: is not a rotation matrix"),
         (ConfigProblem::Exchanged, "a.b: puts the right camera to the left of the left one: exchange the two"),
+        (ConfigProblem::SameDetector, "a.b: is the detector itself: choose another one"),
     ] {
         assert_eq!(ConfigError::new("a.b", problem).to_string(), text);
     }

@@ -42,6 +42,7 @@ fn links_are_those_of_neighbouring_pixels() {
                 assert_eq!(bit(near(&here, &above, step)), pixel.abs_diff(above[i]) <= step);
                 let [a, b] = [here, above].map(|piece| piece.map(|bits| bits as u8 & 3));
                 assert_eq!(bit(same(&a, &b)), a[i] == b[i]);
+                assert_eq!(bit(changes(&a)), a[i] != if i > 0 { a[i - 1] } else { 0 });
             }
         }
     }

@@ -22,6 +22,7 @@ fn a_picture_holds_all_of_its_rows_or_is_refused() {
                     for y in 0..height {
                         assert_eq!(picture.row(y), &data[y * stride..y * stride + width]);
                     }
+                    assert_eq!(picture.data(), &data[..len]);
                     assert_eq!(picture.row(usize::MAX), picture.row(height - 1));
                     assert_eq!((picture.width(), picture.height(), picture.stride()), (width, height, stride));
                 }

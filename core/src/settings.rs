@@ -61,3 +61,20 @@ impl Settings {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_detector_checks_itself() {
+        for detector in DetectorKind::ALL {
+            assert_eq!(Settings { detector, cross_check: None, ..Settings::default() }.check_detectors(), Ok(()));
+            for other in DetectorKind::ALL {
+                let settings = Settings { detector, cross_check: Some(other), ..Settings::default() };
+                let error = ConfigError::new("cross_check", ConfigProblem::SameDetector);
+                assert_eq!(settings.check_detectors(), if other == detector { Err(error) } else { Ok(()) });
+            }
+        }
+    }
+}

@@ -170,3 +170,19 @@ impl Statistics {
 const fn one_more(count: &mut u32) {
     *count = count.wrapping_add(1);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coverage_is_the_share_of_all_pixels() {
+        let share = |pixels_with_disparity, pixels_without| {
+            Statistics { pixels_with_disparity, pixels_without, ..Statistics::NONE }.coverage()
+        };
+        assert_eq!(share(0, [0; 7]), 0.0);
+        assert_eq!(share(7, [0; 7]), 1.0);
+        assert_eq!(share(0, [1; 7]), 0.0);
+        assert_eq!(share(72, [1, 2, 3, 4, 5, 6, 3]), 0.75);
+    }
+}

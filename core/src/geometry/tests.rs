@@ -110,6 +110,10 @@ fn a_camera_that_looks_to_the_left_sees_along_y() {
     near(frame.point([0.0, 0.0, 4.0]), [2.0, 3.5, 1.0]);
     near(frame.point([1.0, 0.0, 4.0]), [3.0, 3.5, 1.0]);
     near(frame.to_camera([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
+    let place = Place::new(&mount);
+    assert!((place.yaw_left_rad() - core::f32::consts::FRAC_PI_2).abs() < 1.0e-6);
+    assert_eq!((place.origin_m(), frame.origin_m()), ([2.0, -0.5], [2.0, -0.5, 1.0]));
+    assert_eq!(mount.without_place(), Mount { height_m: Some(1.0), ..Mount::default() });
 }
 
 #[test]
@@ -151,6 +155,7 @@ fn distances_are_those_of_the_formula_for_every_step() {
         let (min_disparity, disparities) = (first, 8 + random.below(121) as u16);
         table.configure(&pair, min_disparity, disparities);
         let scale = f64::from(pair.focal_px) * f64::from(pair.baseline_m);
+        assert!((f64::from(table.focal_baseline_px_m()) - scale).abs() < 1.0e-6 * scale, "{pair:?}");
         for steps in 0..=u16::MAX {
             let disparity = f64::from(steps) / 16.0 + f64::from(pair.disparity_offset_px);
             // A disparity of 0 is none, also where an offset would give it a distance.
@@ -253,6 +258,12 @@ fn disparities_with_a_distance_lie_side_by_side() {
             let pixel = crate::disparity::DisparityPixel::from_bits(steps);
             let has_distance = pixel.has_value() && depth.inverse(steps) != 0;
             assert_eq!(covered.contains(&steps), has_distance, "{steps} of {min} + {disparities}, {offset_px} px");
+            // Side by side they have what each has alone.
+            if let (true, Some(next)) = (has_distance, steps.checked_add(1).filter(|next| covered.contains(next))) {
+                let pair = [next, steps];
+                assert_eq!(depth.inverses(&pair), pair.map(|steps| depth.inverse(steps)));
+                assert_eq!(depth.distances_m(&pair), pair.map(|steps| depth.distance_m(steps)));
+            }
         }
     }
 }

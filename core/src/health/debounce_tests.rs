@@ -1,5 +1,7 @@
 //! When reasons are told and when no longer.
 
+use std::{format, string::String};
+
 use super::*;
 
 const SOFT: HealthReason = HealthReason::Blocked;
@@ -37,6 +39,44 @@ fn estimates_are_told_when_found_twice_and_all_until_gone_for_long_enough() {
         [Ok, Degraded, Blind, Blind, Degraded, Degraded, Ok]
     );
     assert_eq!(told(SOFT, 0, 0, &[Blind, Ok]), [Blind, Ok], "zero counts as one");
+}
+
+#[test]
+fn an_interruption_begins_every_count_anew_and_changes_nothing_that_is_told() {
+    let mut found = Findings::NONE;
+    found.raise(SOFT, HealthLevel::Degraded);
+    let mut debounce = Debounce::new(2, 2);
+    assert_eq!(debounce.update(&found), Health::OK);
+    debounce.interrupt();
+    assert_eq!(debounce.update(&found), Health::OK, "the first again");
+    let told = debounce.update(&found);
+    assert!(told.has(SOFT));
+    debounce.interrupt();
+    assert_eq!(debounce.told(), told);
+
+    assert_eq!(debounce.update(&Findings::NONE), told);
+    debounce.interrupt();
+    assert_eq!(debounce.update(&Findings::NONE), told, "gone for the first time again");
+    assert_eq!(debounce.update(&Findings::NONE), Health::OK);
+}
+
+#[test]
+fn reasons_are_called_as_in_the_code_and_each_has_words_of_its_own() {
+    for (bit, reason) in HealthReason::ALL.into_iter().enumerate() {
+        let mut name = String::new();
+        for letter in format!("{reason:?}").chars() {
+            if letter.is_uppercase() && !name.is_empty() {
+                name.push('_');
+            }
+            name.extend(letter.to_lowercase());
+        }
+        assert_eq!((reason.name(), reason as usize), (name.as_str(), bit));
+        let others = HealthReason::ALL.into_iter().filter(|other| *other != reason);
+        assert!(!reason.describe().is_empty() && others.clone().all(|other| other.describe() != reason.describe()));
+    }
+    // What is estimated, or may be a single message or frame by chance.
+    let not_plain = HealthReason::ALL.into_iter().filter(|reason| !reason.is_plain()).map(HealthReason::name);
+    assert!(not_plain.eq(["blocked", "badly_paired", "badly_rectified", "late", "command_trouble"]));
 }
 
 #[test]

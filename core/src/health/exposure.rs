@@ -92,3 +92,59 @@ impl RecentPictures {
         again
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// The exposure of a picture of which these pixels are looked at, row by row; all others are `other`.
+    fn exposure(rows: &[&[u8]], other: u8) -> Exposure {
+        let (width, height) = (rows[0].len() * STEP - 1, rows.len() * STEP - 2);
+        let pixel =
+            |y: usize, x: usize| if y.is_multiple_of(4) && x.is_multiple_of(4) { rows[y / 4][x / 4] } else { other };
+        let pixels: Vec<u8> = (0..height).flat_map(|y| (0..width).map(move |x| pixel(y, x))).collect();
+        Exposure::of(&Picture::packed(&pixels, width, height).unwrap())
+    }
+
+    #[test]
+    fn every_fourth_pixel_of_every_fourth_row_counts() {
+        for other in [0, 100, 255] {
+            let found = exposure(&[&[0, 12, 13, 100, 249], &[250, 255, 251, 20, 50]], other);
+            assert_eq!(found.mean, 120.0);
+            assert!((found.dark_percent - 20.0).abs() < 1.0e-5 && (found.bright_percent - 30.0).abs() < 1.0e-5);
+        }
+        let black = Exposure::of(&Picture::packed(&[0; 64], 8, 8).unwrap());
+        assert_eq!((black.mean, black.dark_percent, black.bright_percent), (0.0, 100.0, 0.0));
+    }
+
+    #[test]
+    fn fingerprints_are_those_published_for_fnv_1a() {
+        // Noll, FNV test suite, 64 bits.
+        assert_eq!(exposure(&[b"foobar"], 7).fingerprint, NonZeroU64::new(0x8594_4171_f739_67e8));
+        assert_eq!(exposure(&[b"foo", b"bar"], 9).fingerprint, NonZeroU64::new(0x8594_4171_f739_67e8));
+        // All the same says nothing, however many they are.
+        assert_eq!(exposure(&[b"a"], 7).fingerprint, None);
+        assert_eq!(exposure(&[b"zzz", b"zzz"], 7).fingerprint, None);
+    }
+
+    #[test]
+    fn a_picture_of_the_newest_three_has_come_again() {
+        let of = |number: u64| Exposure { fingerprint: NonZeroU64::new(number), ..Exposure::default() };
+        let mut recent = RecentPictures::NONE;
+        // Left and right apart; 0 stands for a picture that says nothing.
+        for (left, right, again) in [
+            (1, 11, [false, false]),
+            (2, 1, [false, false]),
+            (3, 11, [false, true]),
+            (1, 12, [true, false]),
+            (4, 1, [false, true]),
+            (2, 13, [false, false]),
+            (0, 0, [false, false]),
+            (0, 13, [false, true]),
+        ] {
+            assert_eq!(recent.came_again(&[of(left), of(right)]), again, "{left}, {right}");
+        }
+    }
+}

@@ -71,3 +71,39 @@ impl Detectors {
         Some(self.check).filter(|check| *check != self.main)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{format, string::String};
+
+    use super::*;
+
+    #[test]
+    fn detectors_are_found_by_the_names_that_they_have_in_the_code() {
+        for kind in DetectorKind::ALL {
+            let mut name = String::new();
+            for letter in format!("{kind:?}").chars() {
+                if letter.is_uppercase() && !name.is_empty() {
+                    name.push('-');
+                }
+                name.extend(letter.to_lowercase());
+            }
+            assert_eq!((kind.name(), DetectorKind::from_name(&name)), (name.as_str(), Some(kind)));
+        }
+        for other in ["", "surface", "Cost-Map", "xyzzy"] {
+            assert_eq!(DetectorKind::from_name(other), None);
+        }
+    }
+
+    #[test]
+    fn a_detector_that_is_to_check_itself_checks_nothing() {
+        assert_eq!(Detectors::DEFAULT, Detectors::new(DetectorKind::default(), None));
+        for main in DetectorKind::ALL {
+            assert_eq!(Detectors::new(main, None).cross_check(), None);
+            for check in DetectorKind::ALL {
+                let both = Detectors::new(main, Some(check));
+                assert_eq!((both.main(), both.cross_check()), (main, (check != main).then_some(check)));
+            }
+        }
+    }
+}

@@ -159,6 +159,12 @@ fn a_million_matrices_agree_with_nalgebra_in_f64() {
             worst_value = worst_value.max(if largest > 0.0 { error / largest } else { 0.0 });
         }
         assert!(found.values.is_sorted(), "{index}: {found:?}");
+        if largest > 1.0e-35 {
+            for (gap, pair) in [(found.lower_gap(), &truth[..2]), (found.upper_gap(), &truth[1..])] {
+                let error = f64::from(gap) - (pair[1].0 - pair[0].0) / largest;
+                assert!(error.abs() <= 4.0e-5, "{index}: {input:?}: a gap of {gap:e}, off by {error:e}");
+            }
+        }
 
         // Where the matrix was rounded relative to its size, not to the smallest number, the vector must be that of the
         // matrix before rounding as well.
@@ -209,6 +215,7 @@ fn exactly_degenerate_matrices_are_flagged() {
     }
     let zero = SymmetricMatrix3::default().eigen().unwrap();
     assert_eq!((zero.values, zero.smallest, zero.largest), ([0.0; 3], None, None));
+    assert_eq!((zero.lower_gap(), zero.upper_gap()), (0.0, 0.0));
 }
 
 #[test]

@@ -171,6 +171,7 @@ mod tests {
         for base in (0x100..=0x700).step_by(0x100) {
             for node in 0..16 {
                 let address = Address { base: BaseId::new(base).unwrap(), node: NodeId::new(node).unwrap() };
+                assert_eq!((address.base.get(), address.node.get()), (base, node));
                 for message in Message::ALL {
                     let id = address.id(message);
                     assert!(!core::mem::replace(&mut seen[usize::from(id.as_raw())], true), "{id:?} twice");

@@ -113,6 +113,24 @@ mod tests {
             if let Some(frame) = Frame::fd(id, data) {
                 assert_eq!((frame.data(), frame.id(), frame.is_fd()), (data, id, true));
             }
+            if let Some(frame) = Frame::classic(id, data) {
+                assert_eq!((frame.data(), frame.id(), frame.is_fd()), (data, id, false));
+            }
         }
+    }
+
+    #[test]
+    fn drivers_see_the_frame_through_their_own_trait() {
+        use embedded_can::{ExtendedId, Frame as _};
+
+        let id = StandardId::new(0x2A5).unwrap();
+        let frame = <Frame as embedded_can::Frame>::new(id, &[1, 2, 3]).unwrap();
+        assert_eq!(frame, Frame::classic(id, &[1, 2, 3]).unwrap());
+        assert_eq!((embedded_can::Frame::id(&frame), frame.dlc()), (Id::Standard(id), 3));
+        assert_eq!(embedded_can::Frame::data(&frame), [1, 2, 3]);
+        assert!(frame.is_standard() && frame.is_data_frame());
+        // The wire has neither.
+        assert!(<Frame as embedded_can::Frame>::new(ExtendedId::new(0x2A5).unwrap(), &[1]).is_none());
+        assert!(Frame::new_remote(id, 3).is_none());
     }
 }

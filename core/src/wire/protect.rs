@@ -278,6 +278,21 @@ mod tests {
     }
 
     #[test]
+    fn a_packet_hands_out_its_parts() {
+        let address = Address::default();
+        let id = address.id(Message::Header);
+        for counter in 0..COUNTER_VALUES {
+            let mut data = [0, 0, 0x21, 0x43, 0x65, 0x87, 0xA9, 0xCB];
+            protect(id.as_raw(), counter, &mut data);
+            let packet = Packet::check(address, id, &data).unwrap().unwrap();
+            // CRC in the first byte, the counter in the low half of the second.
+            assert_eq!((packet.crc(), packet.counter()), (data[0], data[1] & 0xF));
+            assert_eq!((packet.message(), packet.counter()), (Message::Header, counter));
+            assert_eq!((packet.data(), packet.payload()), (&data[..], &data[2..]));
+        }
+    }
+
+    #[test]
     fn a_message_under_another_identifier_is_refused() {
         let sender = Address::default();
         for message in Message::ALL.into_iter().filter(|message| !message.is_fd()) {

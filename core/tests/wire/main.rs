@@ -1,5 +1,6 @@
 //! The wire from one end to the other: made-up maps are sent, spoiled on their way, and received.
 
+mod answers;
 mod dbc;
 mod faults;
 mod log;

@@ -119,6 +119,14 @@ mod tests {
         let far = GroundPlane { camera_height_m: 1e9, pitch_down_rad: 1e9, roll_rad: -1e9, age_frames: 999, ..plane };
         let wire = WireGround { age_frames: 15, camera_height_mm: 16383, pitch_down: 2047, roll: -2048 };
         assert_eq!(GroundRepr::of(Some(&far), 1).ground, Some(wire));
-        assert_eq!(GroundRepr::of(Some(&GroundPlane { roll_rad: f32::NAN, ..plane }), 1).ground, None);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for plane in [
+                GroundPlane { camera_height_m: bad, ..plane },
+                GroundPlane { pitch_down_rad: bad, ..plane },
+                GroundPlane { roll_rad: bad, ..plane },
+            ] {
+                assert_eq!(GroundRepr::of(Some(&plane), 1).ground, None);
+            }
+        }
     }
 }
