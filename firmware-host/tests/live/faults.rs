@@ -104,7 +104,7 @@ fn a_frame_that_takes_too_long_is_late() {
 
 #[test]
 fn a_full_queue_abandons_scans_but_lets_every_heartbeat_through() {
-    let Setup { listener, running, .. } = healthy();
+    let Setup { mut listener, running, .. } = healthy();
     let before_ns = now_ns();
     running.bus.full_for(3000);
     let (trouble_ns, _) = listener.wait_for_reason(HealthReason::BusTrouble, before_ns);

@@ -136,8 +136,8 @@ impl Listener {
         self.shared.bad.load(Ordering::Relaxed)
     }
 
-    /// Listens no more.
-    pub(crate) fn finish(mut self) -> ReceiverStatistics {
+    /// Listens until there is nothing more to hear, and then no more: whatever was sent before is there afterwards.
+    pub(crate) fn finish(&mut self) -> ReceiverStatistics {
         self.shared.stop.store(true, Ordering::Relaxed);
         self.thread.take().unwrap().join().unwrap()
     }

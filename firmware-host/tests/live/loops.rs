@@ -64,7 +64,7 @@ fn a_live_rig_says_what_replay_writes_for_the_same_pictures() {
 fn live_is_as_replayed(recording: &Path, replayed: &[(u32, Vec<u8>)], threads_per_pair: u8) {
     let options = options(256, 192, 5);
     let bus = VirtualBus::new(10_000);
-    let listener = Listener::on(&bus);
+    let mut listener = Listener::on(&bus);
     let recorded = Recording::open(recording).unwrap();
     let (calibration, mount) = (recorded.calibration.stereo, recorded.mount);
     let memory = fencepost_hal::camera::MemoryCamera::fill(&mut recorded.into_camera());
@@ -74,10 +74,10 @@ fn live_is_as_replayed(recording: &Path, replayed: &[(u32, Vec<u8>)], threads_pe
     plan.calibration = calibration;
     let report = start(vec![plan], RunSettings { threads_per_pair, ..patient() }, &bus).wait();
     assert_eq!((report.bus.scans, report.bus.overtaken, report.bus.sent.whole_scans), (5, 0, 5), "{report:?}");
+    let statistics = listener.finish();
     let live: Vec<_> = listener.frames().iter().filter(|frame| is_of_a_scan(frame)).map(timeless).collect();
     assert!(live.len() > 5 * 8, "{} frames", live.len());
     assert_eq!(live, replayed);
-    let statistics = listener.finish();
     assert_eq!((statistics.scans, statistics.abandoned_scans, statistics.lost), (5, 0, 0));
 }
 
@@ -85,11 +85,12 @@ fn live_is_as_replayed(recording: &Path, replayed: &[(u32, Vec<u8>)], threads_pe
 fn the_first_heartbeat_says_starting_and_the_last_one_stopping() {
     let options = options(160, 120, 4);
     let bus = VirtualBus::new(10_000);
-    let listener = Listener::on(&bus);
+    let mut listener = Listener::on(&bus);
     let camera = OrderedCamera::new(memory(options).repeated(u32::MAX), (160, 120), Some(Duration::from_millis(50)));
     let running = start(vec![pair("front", camera, &options, options.mount())], patient(), &bus);
     listener.wait_until_healthy(0);
     let report = running.stop();
+    listener.finish();
     let heartbeats = listener.heartbeats();
     assert_eq!(heartbeats.first().unwrap().1.state, NodeState::Starting);
     assert!(heartbeats.iter().any(|(_, heartbeat)| heartbeat.state == NodeState::Running));

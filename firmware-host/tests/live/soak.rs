@@ -52,7 +52,7 @@ fn an_hour_of_pictures_with_faults_at_random() {
     let options = options(SIZE.0, SIZE.1, 40);
     // All of it is in use long before the memory is looked at.
     let bus = VirtualBus::new(4000);
-    let listener = Listener::forgetful_on(&bus);
+    let mut listener = Listener::forgetful_on(&bus);
     // No pause between the pairs.
     let camera = OrderedCamera::new(memory(options).repeated(u32::MAX), SIZE, Some(Duration::ZERO));
     let orders = camera.orders();
