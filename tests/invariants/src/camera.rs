@@ -245,6 +245,11 @@ impl Eye {
         [z * forward, z * left, self.origin_m[2] + z * up]
     }
 
+    /// Distance of the camera from a point in the frame of the pair, metres.
+    pub(crate) fn distance_m(&self, [forward, left, up]: [f64; 3]) -> f64 {
+        forward.hypot(left).hypot(up - self.origin_m[2])
+    }
+
     /// The point in the vehicle frame, metres.
     pub(crate) fn point(&self, x: usize, y: usize, steps: u16) -> [f64; 3] {
         let [forward, left, up] = self.in_pair(x, y, steps);

@@ -103,7 +103,8 @@ impl Stages {
             let known = place_of[part].get_or_insert(in_table);
             assert_eq!(*known, in_table, "a surface in pieces");
             if let Some(in_table) = in_table.filter(|_| in_f64) {
-                sums[in_table].add(eye.in_pair(x, y, pixel.steps()));
+                let point = eye.in_pair(x, y, pixel.steps());
+                sums[in_table].add(point, eye.distance_m(point));
             }
         }
         let kept = |kept: bool| {
@@ -213,15 +214,16 @@ struct Sums {
     n: f64,
     sum: [f64; 3],
     products: [[f64; 3]; 3],
+    /// Distance of the farthest from the camera: sums in the core keep so many bits of that, not of the distance from the ground.
     farthest_m: f64,
 }
 
 impl Sums {
-    fn add(&mut self, point: [f64; 3]) {
+    fn add(&mut self, point: [f64; 3], from_camera_m: f64) {
         self.n += 1.0;
+        self.farthest_m = self.farthest_m.max(from_camera_m);
         for i in 0..3 {
             self.sum[i] += point[i];
-            self.farthest_m = self.farthest_m.max(point[i].abs());
             for j in 0..3 {
                 self.products[i][j] += point[i] * point[j];
             }
