@@ -3,12 +3,12 @@
 use embedded_can::StandardId;
 use fencepost_core::wire::{
     Address, BaseId, Command, CommandEncoder, CommandReceiver, CommandStatistics, Frame, Message, NodeId, PacketError,
-    ReceiveError, VehicleMotionRepr, protect,
+    ReceiveError, VehicleMotionRepr,
 };
 
 use crate::{
     Source,
-    frames::{has_checksum, is_protected},
+    frames::{forge, has_checksum, is_protected},
 };
 
 const TIMEOUT_NS: u64 = 100_000_000;
@@ -66,7 +66,7 @@ fn next_frame(
             let mut data = [0; 24];
             let data = &mut data[..message.data_len()];
             data.iter_mut().for_each(|byte| *byte = source.byte());
-            protect(address.raw_id(message), source.byte(), data);
+            forge(address.raw_id(message), source.byte(), data);
             return (address.id(message), data.to_vec());
         }
         6 => {

@@ -34,3 +34,10 @@ pub(crate) fn is_protected(raw_id: u16, data: &[u8]) -> bool {
 pub(crate) fn has_checksum(raw_id: u16, data: &[u8]) -> bool {
     data.first() == Some(&crc(raw_id, data))
 }
+
+/// Protects the bytes under an identifier as they should be, but with any counter: 15 is never sent.
+pub(crate) fn forge(raw_id: u16, counter: u8, data: &mut [u8]) {
+    let [_, second, ..] = data else { return };
+    *second = ((raw_id >> 8) as u8 & 0x0F) << 4 | counter & 0x0F;
+    data[0] = crc(raw_id, data);
+}

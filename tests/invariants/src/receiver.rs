@@ -9,13 +9,12 @@ use fencepost_core::{
         Address, CELL_INDEX_MAX, CELL_INDEX_MIN, Frame, FrameFormat, Message, NoScan, NodeState, PROTOCOL_VERSION,
         PacketError, ReceiveError, Received, ReceiverConfig, ReceiverStatistics, Scan, ScanEncoder, ScanReceiver,
         Status, WireConfig, WireSettings, check_geometry, max_bits_per_second, max_frames_per_scan, max_load_permille,
-        protect,
     },
 };
 
 use crate::{
     Source,
-    frames::{has_checksum, is_protected},
+    frames::{forge, has_checksum, is_protected},
 };
 
 const RUNS: usize = 24;
@@ -117,6 +116,17 @@ impl Bus {
                         }
                         (true, 4) if k > 0 => self.deliver(waiting[k - 1].id(), waiting[k - 1].data()),
                         (true, 5) if k + 1 < waiting.len() => self.deliver(waiting[k + 1].id(), waiting[k + 1].data()),
+                        (true, 7) => {
+                            // Somebody changes a byte of what follows in its place, and the checksum with it.
+                            let mut data = frame.data().to_vec();
+                            let place = 2 + source.below(data.len() - 2);
+                            data[place] = source.byte();
+                            let counter = data[1];
+                            forge(frame.id().as_raw(), counter, &mut data);
+                            self.forged = true;
+                            self.deliver(frame.id(), &data);
+                            continue;
+                        }
                         (true, 6) => self.now_ns += u64::from(source.byte()) * 4,
                         _ => {}
                     }
@@ -130,7 +140,7 @@ impl Bus {
                 let mut data = [0; 24];
                 let data = &mut data[..message.data_len()];
                 data.iter_mut().for_each(|byte| *byte = source.byte());
-                protect(self.address.raw_id(message), source.byte(), data);
+                forge(self.address.raw_id(message), source.byte(), data);
                 self.forged = true;
                 self.deliver(self.address.id(message), data);
             }
@@ -292,12 +302,17 @@ fn check_settings(source: &mut Source<'_>) {
         let permille = max_load_permille(&config, source.double_word(), rate);
         assert!(permille > 0 && max_load_permille(&config, u32::MAX, rate) <= permille.max(1));
     }
-    let geometry = MapGeometry {
-        cell_size_mm: source.word(),
-        x_first: source.word() as i16,
-        x_count: source.word() % 300,
-        y_first: i16::from(source.byte() as i8),
-        y_count: u16::from(source.byte()),
+    let (cell_size_mm, largest) = (source.word(), source.below(4) == 3);
+    let geometry = match largest {
+        // More cells than can be counted by one.
+        true => MapGeometry { cell_size_mm, x_first: -64, x_count: 128, y_first: -64, y_count: 128 },
+        false => MapGeometry {
+            cell_size_mm,
+            x_first: source.word() as i16,
+            x_count: source.word() % 300,
+            y_first: i16::from(source.byte() as i8),
+            y_count: u16::from(source.byte()),
+        },
     };
     let fits = |first: i16, count: u16| (-64..=63).contains(&first) && i32::from(first) + i32::from(count) <= 64;
     let MapGeometry { cell_size_mm, x_first, x_count, y_first, y_count } = geometry;
