@@ -2,7 +2,7 @@
 
 use fencepost_core::{
     arch::Backend,
-    detector::Detector,
+    detector::{Band, Detector},
     disparity::{DisparityPixel, Reason},
     geometry::{Mount, RectifiedPair},
     settings::Settings,
@@ -28,6 +28,8 @@ pub(crate) const SURFACES: usize = 8;
 
 /// The detector that is fuzzed.
 pub(crate) type Small = Detector<PIXELS, WIDTH, DISPARITIES, 42, SURFACES, OBSTACLES, CELLS>;
+/// What it needs for each further band of a picture.
+pub(crate) type Piece = Band<WIDTH, DISPARITIES, CELLS>;
 
 /// Everything that a detector is configured with.
 #[derive(Clone, Copy, Debug)]

@@ -38,8 +38,17 @@ thread_local! {
 /// Pictures that are just high enough for a few rows under the window, with both.
 pub(crate) fn check(source: &mut Source<'_>) {
     let any = 8 + source.below(DISPARITIES - 7) as u16;
-    let settings =
+    let mut settings =
         MatchSettings { disparities: source.one_of(&[16, 32, 48, 64, 80, any]), ..settings::matching(source) };
+    // Now and then one that is refused: windows without a middle, more disparities than there is room for.
+    match source.byte() {
+        0..250 => {}
+        250 => settings.window_width += 1,
+        251 => settings.window_height += 1,
+        252 => settings.wide_window_width |= 16,
+        253 => settings.wide_window_width += 1,
+        _ => settings.disparities = DISPARITIES as u16 + 1 + u16::from(source.byte()),
+    }
     let backend = source.one_of(Backend::ALL);
     let size = (source.one_of(&[64, 80, 100, WIDTH]), usize::from(settings.window_height) + 6 + source.below(3));
     let sides = [(source.below(20), source.below(20)), (source.below(20), source.below(20))];
@@ -51,6 +60,10 @@ pub(crate) fn check(source: &mut Source<'_>) {
         }
         let configured = plain.configure(&settings, size.0, size.1);
         assert_eq!(other.configure(&settings, size.0, size.1), configured, "refused by a backend");
+        let windows = [settings.window_width, settings.window_height, settings.wide_window_width.max(1)];
+        if windows.iter().any(|edge| edge.is_multiple_of(2)) || usize::from(settings.disparities) > DISPARITIES {
+            assert!(configured.is_err(), "taken: {settings:?}");
+        }
         if configured.is_err() {
             return;
         }
@@ -87,7 +100,9 @@ fn run(
     let mut next = 0;
     for y in (0..height).chain([0]) {
         let [left, right] = pictures.each_ref().map(|picture| &picture[y * (width + GAP)..][..width]);
+        // Rows of another length are none.
         matcher.push(&left[1..], right, spans[0], spans[1]);
+        matcher.push(left, &right[1..], spans[0], spans[1]);
         matcher.push(left, right, spans[0], spans[1]);
         while next < height && matcher.pull(next, &mut found[next * width..][..width]) {
             next += 1;
@@ -95,4 +110,5 @@ fn run(
     }
     assert_eq!(next, height, "rows that never came");
     assert!(!matcher.pull(height, &mut found[..width]), "a row below the picture");
+    assert!(!matcher.pull(height - 1, &mut found[1..width]), "a row of another length");
 }

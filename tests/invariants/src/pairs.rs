@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use fencepost_core::{
+    bands::OneThread,
     detector::DetectError,
     geometry::StereoCalibration,
     health::{Health, HealthLevel},
@@ -11,19 +12,24 @@ use fencepost_core::{
 
 use crate::{
     Source,
-    camera::{Camera, Small, Two, frames},
+    camera::{Camera, Piece, Small, Two, frames},
     detection::{assert_found_same, assert_same, check},
     matchers,
 };
 
 struct Detectors {
     two: Two,
+    bands: [Piece; 2],
     pictures: [Vec<u8>; 2],
 }
 
 thread_local! {
     static DETECTORS: RefCell<Box<Detectors>> =
-        RefCell::new(Box::new(Detectors { two: Two::new(), pictures: Default::default() }));
+        RefCell::new(Box::new(Detectors {
+            two: Two::new(),
+            bands: [const { Piece::new() }; 2],
+            pictures: Default::default(),
+        }));
 }
 
 /// Runs one input.
@@ -37,11 +43,13 @@ pub fn run(bytes: &[u8]) {
 
 impl Detectors {
     fn check(&mut self, source: &mut Source<'_>) {
-        let Self { two, pictures } = self;
+        let Self { two, bands, pictures } = self;
         two.choose(source);
         let Two { first, second, .. } = two;
         let frames = frames(source);
         let twice = source.below(16) == 0;
+        // How many bands the second detector cuts its pictures into, besides the first.
+        let cuts = if twice { source.below(3) } else { 0 };
         let alone = source.below(16) == 0;
         let camera = Camera::read(source);
         let size = (camera.pair.width as usize, camera.pair.height as usize);
@@ -75,8 +83,12 @@ impl Detectors {
                 if forget {
                     second.forget();
                 }
-                assert!(second.detect(&left, &right, &mut ()).is_ok());
-                assert_same(first, second, "the same frames once more");
+                let found = match &mut bands[..cuts] {
+                    [] => second.detect(&left, &right, &mut ()),
+                    bands => second.detect_in_bands(&left, &right, bands, &mut OneThread, &mut ()),
+                };
+                assert!(found.is_ok());
+                assert_same(first, second, "the same frames once more, in bands or as a whole");
             } else if forget {
                 Self::check_forgotten(first, second, &camera, [&left, &right], told);
             }

@@ -55,6 +55,11 @@ pub fn run(bytes: &[u8]) {
             assert_eq!(again.configure(&calibration), Ok(pair));
         }
         check_rows(&mut source, rectifier, twice.then_some(again), &raw, &pair);
+        // Any place has one in the raw picture that is a number, or none.
+        let [u, v] = [0; 2].map(|_| source.any_number(-1.0e4, 1.0e4));
+        if let Some((x, y)) = rectifier.source_of(Side::Right, u, v) {
+            assert!(x.is_finite() && y.is_finite(), "{x}, {y} for {u}, {v}");
+        }
     });
 }
 
@@ -69,6 +74,7 @@ fn check_rectified(pair: RectifiedPair) {
         }
         assert_eq!((found, rectifier.rotation(Side::Left)), (Ok(pair), None));
         assert_eq!(rectifier.raw_size(Side::Right), (width, height));
+        assert_eq!(rectifier.source_of(Side::Left, 3.0, -5.5), Some((3.0, -5.5)));
         let pixels: Vec<u8> = (0..width * height).map(|i| (i * 7) as u8).collect();
         for (columns, rows) in [(width, height), (width - 3, height - 1)] {
             let Ok(picture) = Picture::packed(&pixels, columns, rows) else { panic!("{columns} x {rows}") };

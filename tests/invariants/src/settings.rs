@@ -29,7 +29,8 @@ pub(crate) fn read(source: &mut Source<'_>) -> Settings {
         DetectorKind::PixelNormals,
     ]);
     let other = source.one_of(&DetectorKind::ALL);
-    let cross_check = (source.below(4) == 3 && other != detector).then_some(other);
+    // One that checks itself is refused, which is tried seldom.
+    let cross_check = (source.below(4) == 3 && (other != detector || source.below(16) == 15)).then_some(other);
     Settings {
         detector,
         cross_check,
@@ -68,7 +69,7 @@ pub(crate) fn read(source: &mut Source<'_>) -> Settings {
         },
         disparity_segments: DisparitySegmentSettings::default(),
         pixel_normals: PixelNormalSettings {
-            window: source.one_of(&[11, 3, 5, 21]),
+            window: source.one_of(&[11, 3, 5, 21, 11, 3, 5, 4]),
             min_filled_percent: source.one_of(&[50, 0, 100]),
             ..PixelNormalSettings::default()
         },

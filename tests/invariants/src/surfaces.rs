@@ -73,6 +73,7 @@ impl Stages {
             assert!(surfaces.table().is_empty(), "surfaces in a picture of another size");
         }
         let report = surfaces.run(picture, depth, &rays);
+        assert_eq!([surfaces.place_at(width, 0), surfaces.place_at(0, height)], [None; 2], "outside of the picture");
 
         // What hangs together, by the rule in words.
         let near = |a: usize, b: usize| {
@@ -120,6 +121,11 @@ impl Stages {
             }
         }
 
+        // Joined over a picture of another size: none of them.
+        if source.below(16) == 15 {
+            regions.join(surfaces, DisparityPicture::new(&pixels[width..], width), |_| true);
+            assert_eq!(regions.roots().count(), surfaces.table().len(), "surfaces joined over another picture");
+        }
         // Joined over the whole picture: all of them, or those of one class.
         const CHOICES: [Option<SurfaceClass>; 2] = [None, Some(SurfaceClass::Vertical)];
         for only in source.one_of(&[&CHOICES[..1], &CHOICES[1..], &CHOICES]) {
