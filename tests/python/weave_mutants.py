@@ -1,6 +1,9 @@
 """Runs the mutants of a module that can be woven into one program (tests/weave), each in a run of its own of the module's tests.
 
-usage: weave_mutants.py WEAVER TREE RESULTS_FOLDER MODULE
+usage: weave_mutants.py WEAVER TREE RESULTS_FOLDER MODULE [all]
+
+A mutant is tried with the tests of its module and with the quick ones of all others; with `all`, those that are still alive also with
+the others of the modules that name it.
 
 RESULTS_FOLDER has the mutants in `list.json`. To its `outcomes` a line is added for each mutant that was run, and mutants that are there
 are not run again, unless they lived: there may be new tests. `left` has those that a build of their own must judge, `slow` the tests
@@ -28,9 +31,9 @@ REFUSED = ("E0277", "E0369", "E0433", "E0599")
 JUDGED = ("caught", "timeout", "unviable")
 
 
-def build(tree):
+def build(tree, targets):
     """Builds the woven tests: their programs, or the compiler's errors."""
-    command = ["cargo", "test", "--locked", "--package", "fencepost-core", "--lib", "--test", "wire", "--no-run"]
+    command = ["cargo", "test", "--locked", "--package", "fencepost-core", *targets, "--no-run"]
     done = subprocess.run([*command, "--message-format=json"], cwd=tree, env=ENVIRONMENT, capture_output=True, text=True)
     messages = [json.loads(line) for line in done.stdout.splitlines()]
     programs = {m["target"]["name"]: m["executable"] for m in messages if m.get("executable")}
@@ -40,7 +43,7 @@ def build(tree):
     return programs, errors
 
 
-def weave(program, listed, tree, folder, sources):
+def weave(program, listed, tree, folder, sources, targets):
     """Weaves in what the compiler takes: the programs, the numbers that are in them, and those that cannot be built anywhere."""
     left_out, impossible = set(), set()
     while True:
@@ -49,7 +52,7 @@ def weave(program, listed, tree, folder, sources):
         (folder / "left_out").write_text("\n".join(map(str, sorted(left_out))))
         out = subprocess.run([program, listed, tree, folder / "left_out"], stdout=subprocess.PIPE, text=True, check=True).stdout
         places = [line.split() for line in out.splitlines()]
-        programs, errors = build(tree)
+        programs, errors = build(tree, targets)
         if not errors:
             return programs, {int(number): constant == "true" for number, _, _, _, constant in places}, impossible
         refused = set()
@@ -116,7 +119,7 @@ def naming(tree, module):
             if re.search(rf"\b{module}::", path.read_text())}  # fmt: skip
 
 
-def main(weaver, tree, folder, module):
+def main(weaver, tree, folder, module, thorough=""):
     tree, folder = Path(tree), Path(folder)
     listed = folder / "list.json"
     mutants = json.loads(listed.read_text())
@@ -124,12 +127,14 @@ def main(weaver, tree, folder, module):
     done = folder / "outcomes"
     known = dict(reversed(line.split("\t")) for line in done.read_text().splitlines()) if done.exists() else {}
     try:
-        programs, woven, impossible = weave(weaver, listed, tree, folder, sources)
+        # Of the core's other tests none looks at anything but the wire.
+        targets = ["--lib", "--test", "wire"] if module == "wire" else ["--lib"]
+        programs, woven, impossible = weave(weaver, listed, tree, folder, sources, targets)
         runs = Runs(programs, tree)
         times = runs.times()
         quick = {test for test, seconds in times.items() if seconds < QUICK_S}
         own = {test for test in times if test[1].startswith(f"{module}::") or (module, test[0]) == ("wire", "wire")}
-        users = {test for test in times if test[1].split("::")[0] in naming(tree, module)}
+        users = {test for test in times if thorough and test[1].split("::")[0] in naming(tree, module)}
         (folder / "slow").write_text("".join(f"{test}\n" for _, test in times.keys() - quick))
         began = time.monotonic()
         alive = [number for number, mutant in enumerate(mutants, 1)

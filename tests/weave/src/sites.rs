@@ -90,7 +90,9 @@ impl Sites<'_> {
     fn body(&mut self, signature: &Signature, block: &Block, visit: impl FnOnce(&mut Self)) {
         let before = self.constant;
         self.constant = signature.constness.is_some();
-        if let (Some(first), Some(last)) = (block.stmts.first(), block.stmts.last()) {
+        // One `impl Trait` cannot be two types.
+        let one_type = self.text(&signature.output).contains("impl ");
+        if let (Some(first), Some(last), false) = (block.stmts.first(), block.stmts.last(), one_type) {
             let whole = self.range(first).start..self.range(last).end;
             if let Some(mutants) = self.here.remove(&("FnValue", whole.start)) {
                 let mut parts = vec![("match crate::mutant::on() { ".to_owned(), None)];
