@@ -2,8 +2,8 @@
 
 usage: weave_mutants.py WEAVER TREE RESULTS_FOLDER MODULE [all]
 
-A mutant is tried with the tests of its module and with the quick ones of all others; with `all`, those that are still alive also with
-the others of the modules that name it.
+A mutant is tried with the tests of its module, first the quick ones; with `all`, those that are still alive also with the tests of the
+modules that name it.
 
 RESULTS_FOLDER has the mutants in `list.json`. To its `outcomes` a line is added for each mutant that was run, and mutants that are there
 are not run again, unless they lived: there may be new tests. `left` has those that a build of their own must judge, `slow` the tests
@@ -143,7 +143,7 @@ def main(weaver, tree, folder, module, thorough=""):
             for number in impossible:
                 known[mutants[number - 1]["name"]] = "unviable"
                 print("unviable", mutants[number - 1]["name"], sep="\t", file=file)
-            for chosen in (own & quick, quick - own, own - quick, users - own - quick):
+            for chosen in (own & quick, own - quick, users - own):
                 tests = {test: times[test] for test in chosen}
                 tried, alive = alive, []
                 for number in tried:

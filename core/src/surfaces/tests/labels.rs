@@ -204,7 +204,7 @@ fn a_tile_of_coded_pixels_holds_one_surface_less() {
     // Those of the test above; beside two bits of a class there are six for a number.
     let block = |i: usize| i / 32 / 4 * 8 + i % 32 / 4;
     let code = |i: usize| (1 + block(i) % (CODES - 1)) as u8;
-    let alternate = |i: usize| if (i % 32 / 4 + i / 32 / 4) % 2 == 0 { 100 } else { 500 };
+    let alternate = |i: usize| if (i % 32 / 4 + i / 32 / 4).is_multiple_of(2) { 100 } else { 500 };
     let pixels: Vec<_> = (0..32 * 32).map(|i| DisparityPixel::from_steps(alternate(i))).collect();
     let classes = [SurfaceClass::Undefined, SurfaceClass::Ground, SurfaceClass::Slanted, SurfaceClass::Obstacle];
     let mut stage = Box::new(Surfaces::<1024, 64>::new());
