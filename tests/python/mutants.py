@@ -3,6 +3,7 @@
 usage: mutants.py RESULTS_FOLDER LIST.toml MODULE...
 """
 
+import json
 import re
 import sys
 import tomllib
@@ -22,16 +23,12 @@ def without_place(mutant):
     return re.sub(r"^([^:]+):\d+:\d+: ", r"\1: ", mutant)
 
 
-def outcome(folder):
-    """Mutants of a module by what became of them; each is in one of the lists."""
-    found = {}
-    first, second = folder / "first" / "mutants.out", folder / "second" / "mutants.out"
-    alive = set(lines(first / "missed.txt"))
-    for name in ("caught", "timeout", "unviable"):
-        found[name] = lines(first / f"{name}.txt") + [text for text in lines(second / f"{name}.txt") if text in alive]
-    # What the first run let live is what the second was for; it may have run others, since fields that are left out are not chosen by
-    # expressions.
-    found["missed"] = [text for text in lines(second / "missed.txt") if text in alive]
+def outcomes(folder):
+    """The mutants of a module by what became of them; of what was tried twice the last try counts."""
+    last = dict(reversed(line.split("\t")) for line in lines(folder / "outcomes"))
+    found = {outcome: [] for outcome in ("caught", "timeout", "missed", "unviable")}
+    for mutant, outcome in last.items():
+        found[outcome].append(mutant)
     return found
 
 
@@ -51,8 +48,8 @@ def main(results, path, *modules):
     columns = ("killed", "timed out", "argued", "survived", "not built", "excluded", "not run")
     print(" | ".join(("module", *columns)))
     for module in modules:
-        there, chosen = lines(results / module / "all"), lines(results / module / "chosen")
-        found = outcome(results / module)
+        there, chosen = lines(results / module / "all"), json.loads((results / module / "list.json").read_text())
+        found = outcomes(results / module)
         survivors = Counter(map(without_place, found["missed"]))
         here = (f"core/src/{module}/", f"core/src/{module}.rs:")
         expected = Counter({text: number for text, number in listed.items() if text.startswith(here)})

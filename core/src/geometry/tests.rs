@@ -188,6 +188,9 @@ fn distance_and_disparity_are_inverse() {
     }
     assert_eq!(pair.distance_m(-3.5), f32::INFINITY);
     assert_eq!(pair.distance_m(-10.0), f32::INFINITY);
+    // No disparity is no distance behind the camera either, whatever sign its zero has.
+    let far = RectifiedPair { disparity_offset_px: -0.0, ..pair };
+    assert_eq!([0.0, -0.0].map(|disparity_px| far.distance_m(disparity_px)), [f32::INFINITY; 2]);
 }
 
 #[test]
@@ -203,7 +206,12 @@ fn what_cannot_be_is_named() {
     assert_eq!(problem(RectifiedPair { height: u32::MAX, ..good }).field, "calibration.height");
     assert_eq!(problem(RectifiedPair { focal_px: 0.0, ..good }).field, "calibration.focal_px");
     assert_eq!(problem(RectifiedPair { focal_px: -500.0, ..good }).field, "calibration.focal_px");
-    assert_eq!(problem(RectifiedPair { baseline_m: 0.0, ..good }).field, "calibration.baseline_m");
+    // Cameras at one place are not exchanged.
+    let out_of_range = ConfigProblem::OutOfRange { min: 1.0e-3, max: 100.0 };
+    assert_eq!(
+        problem(RectifiedPair { baseline_m: 0.0, ..good }),
+        ConfigError::new("calibration.baseline_m", out_of_range)
+    );
     assert_eq!(
         problem(RectifiedPair { baseline_m: f32::NAN, ..good }),
         ConfigError::new("calibration.baseline_m", nan)

@@ -203,7 +203,10 @@ fn between_the_middles_of_patches_the_ground_is_straight() {
         assert!((terrain.lift_m(x, y) - truth).abs() < 1.0e-4, "{x}, {y}");
     }
     // Beyond the patches the last one counts.
-    for (x, y, at) in [(25.0, 0.0, (19.75, 0.0)), (-3.0, 2.0, (0.25, 2.0)), (5.0, 40.0, (5.0, 9.75))] {
+    let corner = (19.75, 9.75);
+    for (x, y, at) in
+        [(25.0, 0.0, (19.75, 0.0)), (-3.0, 2.0, (0.25, 2.0)), (5.0, 40.0, (5.0, 9.75)), (25.0, 40.0, corner)]
+    {
         assert!((terrain.lift_m(x, y) - (level + slope * at.0 + aside * at.1)).abs() < 1.0e-4, "{x}, {y}");
     }
 }
@@ -239,5 +242,136 @@ fn no_place_is_out_of_reach() {
     let places = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 29.9, 30.0, -15.0, 15.0, 1.0e30, -1.0e30];
     for (x, y) in places.into_iter().flat_map(|x| places.map(|y| (x, y))) {
         let _ = terrain.lift_m(x, y);
+    }
+}
+
+/// Bends whose numbers are exact.
+const BEND: Bend = Bend { patch_m: 0.5, share: 0.0, max_slope: 0.5, tolerance_m: 0.25, tolerance_per_m: 0.125 };
+
+/// A terrain of patches of half a metre, on a plane with exact numbers, of which some patches are known: with their lifts.
+fn known(patches: &[(usize, usize, f32)]) -> Terrain {
+    let plane = GroundPlane { normal: [0.125, 0.25, 0.5], ..GroundPlane::UNSET };
+    let mut terrain = Terrain { plane, patch_m: 0.5, ..Terrain::new() };
+    for &(i, j, lift_m) in patches {
+        terrain.weight[i][j] = LEAST_WEIGHT;
+        terrain.sum_m[i][j] = LEAST_WEIGHT * lift_m;
+    }
+    terrain
+}
+
+/// One point, and behind it what is not there.
+fn point(x: f32, y: f32, height: f32, sure: bool) -> Points {
+    Points { count: 1, x_m: [x; LANES], y_m: [y; LANES], height_m: [height; LANES], sure: [sure; LANES] }
+}
+
+#[test]
+fn ground_is_expected_where_its_neighbours_and_the_slope_of_the_plane_let_it() {
+    // What is known, where, and for ground that is known to be some: lift and reach. A patch ahead the plane falls by
+    // 0.125 / 0.5 x 0.5 m, a patch to the left by twice as much; and ground rises by half a metre in a metre.
+    type Case = (&'static [(usize, usize, f32)], (usize, usize), (f32, f32));
+    let cases: [Case; 9] = [
+        (&[(7, 9, 0.5), (6, 9, 2.0)], (7, 9), (0.5, 0.5)),
+        (&[(6, 9, 0.5), (6, 10, 2.0)], (7, 9), (0.5 + 0.125, 0.5)),
+        (&[(6, 10, 0.5), (7, 10, 2.0)], (7, 9), (0.5 + 0.125 - 0.25, 0.5)),
+        (&[(6, 19, 0.5), (7, 19, 2.0)], (7, 20), (0.5 + 0.125 + 0.25, 0.5)),
+        (&[(6, 20, 0.5), (7, 20, 2.0)], (7, 19), (0.5 + 0.125 - 0.25, 0.5)),
+        (&[(7, 10, 0.5), (4, 9, 2.0)], (7, 9), (0.5 - 0.25, 0.5)),
+        (&[(7, 29, 0.5), (4, 30, 2.0)], (7, 30), (0.5 + 0.25, 0.5)),
+        (&[(4, 9, 0.5), (3, 9, 2.0)], (7, 9), (0.5 + 0.375, 1.0)),
+        (&[], (7, 9), (0.0, 0.25 + 0.5 * 3.0)),
+    ];
+    for (patches, (i, j), expected) in cases {
+        let terrain = known(patches);
+        assert_eq!(terrain.expected_m(i, j, 3.0, true, &BEND), expected, "{i}, {j} of {patches:?}");
+        // What may be something else goes on as it was, and does not begin.
+        let unsure = if patches.is_empty() { (0.0, -1.0) } else { (0.5, 0.25) };
+        assert_eq!(terrain.expected_m(i, j, 3.0, false, &BEND), unsure, "{i}, {j} of {patches:?}");
+    }
+    let mut terrain = known(&[(7, 9, 0.5)]);
+    terrain.weight[7][9] = LEAST_WEIGHT - 0.5;
+    assert_eq!(terrain.expected_m(7, 9, 3.0, false, &BEND), (0.0, -1.0), "too few pixels");
+}
+
+#[test]
+fn points_within_reach_are_followed_and_what_stands_there_hides_the_ground() {
+    // Expected at 0.5 m, within half a metre if it is sure, within a quarter if not.
+    let followed = |height_m, sure| {
+        let mut terrain = known(&[(7, 20, 0.5)]);
+        terrain.follow(&point(3.75, 0.25, height_m, sure), &BEND);
+        (terrain.weight[7][20] - 4.0, terrain.sum_m[7][20] - 2.0)
+    };
+    for (height_m, sure, counted) in [
+        (0.5, true, (1.0, 0.5)),
+        (1.0, true, (1.0, 1.0)),
+        (0.0, true, (1.0, 0.0)),
+        (-0.25, true, (0.0, 0.0)),
+        (3.0, true, (1.0, 0.5)),
+        (0.75, false, (1.0, 0.75)),
+        (0.875, false, (0.0, 0.0)),
+        (3.0, false, (0.0, 0.0)),
+    ] {
+        assert_eq!(followed(height_m, sure), counted, "{height_m} m, {sure}");
+    }
+    // Where nothing is known, what is not sure does not begin.
+    let mut terrain = known(&[]);
+    terrain.follow(&point(3.75, 0.25, 0.0, false), &BEND);
+    assert_eq!(terrain.weight[7][20], 0.0);
+}
+
+#[test]
+fn what_rises_above_the_terrain_or_lies_far_below_is_left_out() {
+    // Two metres ahead: a quarter of a metre and an eighth for each.
+    for (height_m, counted) in [(0.5, true), (0.51, false), (-2.0, true), (-2.01, false), (0.0, true)] {
+        let mut terrain = known(&[]);
+        terrain.trim(&point(2.0, 0.25, height_m, true), &BEND);
+        let found = (terrain.weight[4][20], terrain.sum_m[4][20]);
+        assert_eq!(found, if counted { (1.0, height_m) } else { (0.0, 0.0) }, "{height_m} m");
+    }
+}
+
+#[test]
+fn points_lie_in_their_patch_or_in_none() {
+    let terrain = known(&[]);
+    let patch = |x, y| terrain.patches(&point(x, y, 0.0, true))[0];
+    for (x, i) in [(0.0, Some(0)), (0.49, Some(0)), (0.5, Some(1)), (19.99, Some(39)), (-0.01, None), (20.0, None)] {
+        for (y, j) in [(-10.0, Some(0)), (0.0, Some(20)), (9.99, Some(39)), (-10.01, None), (10.0, None)] {
+            let expected = i.zip(j).map(|(i, j)| i * ACROSS + j);
+            assert_eq!(patch(x, y), expected, "{x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn a_round_begins_with_the_plane_under_the_robot() {
+    let mut terrain = known(&[(3, 3, 1.0), (0, 19, 2.0), (0, 20, 2.0)]);
+    terrain.begin();
+    for (i, row) in terrain.weight.iter().enumerate() {
+        for (j, &weight) in row.iter().enumerate() {
+            let expected = if i == 0 && (j == 19 || j == 20) { PLANE_WEIGHT } else { 0.0 };
+            assert_eq!((weight, terrain.sum_m[i][j]), (expected, 0.0), "{i}, {j}");
+        }
+    }
+    // Each patch on its own: what nothing is known of lies on the plane.
+    terrain.sum_m[0][19] = 50.0;
+    terrain.settle(0.0);
+    assert_eq!((terrain.lift_m[0][19], terrain.lift_m[0][20], terrain.lift_m[5][5]), (2.0, 0.0, 0.0));
+    // Flat ground keeps its patches, and has some before there was any.
+    terrain.flatten(GroundPlane::UNSET);
+    assert_eq!((terrain.patch_m, terrain.lift_m[0][19]), (0.5, 0.0));
+    let mut terrain = Terrain::new();
+    terrain.flatten(GroundPlane::UNSET);
+    assert!(terrain.patch_m > 0.0 && terrain.lift_m(0.0, 0.0) == 0.0);
+}
+
+#[test]
+fn what_stands_upright_says_nothing_of_the_ground() {
+    for (class, says) in [
+        (SurfaceClass::Vertical, Says::Nothing),
+        (SurfaceClass::Ground, Says::Ground),
+        (SurfaceClass::Horizontal, Says::MayBeGround),
+        (SurfaceClass::Slanted, Says::MayBeGround),
+        (SurfaceClass::Undefined, Says::MayBeGround),
+    ] {
+        assert!(Says::of(class) == says, "{class:?}");
     }
 }

@@ -1,5 +1,7 @@
 //! The ground of worlds whose truth is known, seen by a perfect camera in steps of 1/16 px.
 
+mod rules;
+
 use super::*;
 use crate::{
     geometry::Mount,

@@ -1,5 +1,7 @@
 //! Each reason is said when its cause is there, and not otherwise.
 
+mod judge;
+
 use std::{boxed::Box, vec::Vec};
 
 use super::*;

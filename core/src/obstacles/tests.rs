@@ -1,5 +1,7 @@
 //! Obstacles of known place and size, seen by a perfect camera in steps of 1/16 px.
 
+mod rules;
+
 use std::vec::Vec;
 
 use super::*;

@@ -247,3 +247,48 @@ fn any_bits_give_finite_values_and_unit_vectors() {
         }
     }
 }
+
+/// A number of 24 bits, of either sign, at most `2^20` times as large as another: sums and products of two fit into f64 as they are.
+fn short(random: &mut Random) -> f32 {
+    let bits = (random.within(-1.0, 1.0) * f64::from(1 << 24)) as f32;
+    libm::ldexpf(bits, random.below(4) as i32 * 5 - 30)
+}
+
+/// The number that a pair stands for, to as many bits as f64 has.
+fn whole(pair: Pair) -> f64 {
+    f64::from(pair.hi) + f64::from(pair.lo)
+}
+
+#[test]
+fn sums_and_products_of_two_numbers_are_exact() {
+    let mut random = Random::seeded("pairs of two numbers", SEED);
+    for _ in 0..20_000 {
+        let (a, b) = (short(&mut random), short(&mut random));
+        assert_eq!(whole(Pair::sum(a, b)), f64::from(a) + f64::from(b), "{a:e} + {b:e}");
+        assert_eq!(whole(Pair::product(a, b)), f64::from(a) * f64::from(b), "{a:e} x {b:e}");
+    }
+}
+
+#[test]
+fn pairs_keep_more_than_forty_bits() {
+    let mut random = Random::seeded("pairs", SEED);
+    let near = |found: Pair, truth: f64, size: f64, what: &str| {
+        let error = (whole(found) - truth).abs();
+        assert!(error <= size * 2.0_f64.powi(-44), "{what}: {} instead of {truth}", whole(found));
+    };
+    for _ in 0..20_000 {
+        let [a, b, c, d] = core::array::from_fn(|_| short(&mut random));
+        let (x, y) = (Pair::product(a, b), Pair::product(c, d));
+        let (exact_x, exact_y) = (whole(x), whole(y));
+        near(x.add(y), exact_x + exact_y, exact_x.abs() + exact_y.abs(), "sum");
+        near(x.times(c), exact_x * f64::from(c), (exact_x * f64::from(c)).abs(), "product");
+        assert_eq!(whole(x.negated()), -exact_x);
+    }
+}
+
+#[test]
+fn nothing_has_no_direction() {
+    assert_eq!(unit([0.0; 3]), None);
+    assert_eq!(unit([0.0, -0.0, 0.0]), None);
+    assert_eq!(unit([0.0, -3.0, 4.0]), Some([0.0, -0.6, 0.8]));
+}

@@ -1,7 +1,7 @@
 //! What is sent is what is received.
 
 use fencepost_core::health::HealthLevel;
-use fencepost_core::map::{CellState, MapGeometry};
+use fencepost_core::map::{CellState, MapGeometry, UnknownReason};
 use fencepost_core::wire::{
     Command, CommandEncoder, CommandReceiver, Frame, FrameFormat, GroundRepr, MAX_RUN_LENGTH, Message, NoScan,
     NodeState, Received, Run, ScanEncoder, Status, VehicleMotionRepr, WireConfig, WireSettings, max_bits_per_scan,
@@ -185,6 +185,10 @@ fn shapes_without_sense_do_no_harm() {
     let (_, report) = world.encode(&mut encoder(FrameFormat::Fd));
     assert!(report.cells <= 16383);
     assert_eq!(u32::from(report.cells) + report.dropped_cells, 16384);
+    // One less is the most it can, and all of them go.
+    world.cells[0].state = CellState::Unknown(UnknownReason::Hidden);
+    let (_, report) = world.encode(&mut encoder(FrameFormat::Fd));
+    assert_eq!((report.cells, report.dropped_cells), (16383, 0));
 }
 
 #[test]

@@ -134,3 +134,26 @@ fn a_box_does_not_melt_into_the_ground_it_stands_on() {
     std::println!("ground {ground:?}, front {front:?}");
     assert!(ground.0 * 100 > ground.1 * 75 && front.0 * 100 > front.1 * 60, "ground {ground:?}, front {front:?}");
 }
+
+#[test]
+fn settings_out_of_range_are_named() {
+    let good = SurfaceSettings::default();
+    let field = |settings: SurfaceSettings| {
+        let error = settings.check().unwrap_err();
+        let mut stage = Box::new(Surfaces::<{ 64 * 48 }, 64>::new());
+        assert_eq!(stage.configure(&settings, 64, 48), Err(error));
+        error.field
+    };
+    assert_eq!(good.check(), Ok(()));
+    assert_eq!(field(SurfaceSettings { step_sixteenths: 1025, ..good }), "surfaces.step_sixteenths");
+    for min_pixels in [0, 15, 1025] {
+        assert_eq!(field(SurfaceSettings { min_pixels, ..good }), "surfaces.min_pixels");
+    }
+    for horizontal_deg in [0.5, 90.0, f32::NAN] {
+        assert_eq!(field(SurfaceSettings { horizontal_deg, ..good }), "surfaces.horizontal_deg");
+    }
+    // Nothing is both.
+    for vertical_deg in [29.0, 90.0, f32::INFINITY] {
+        assert_eq!(field(SurfaceSettings { vertical_deg, ..good }), "surfaces.vertical_deg");
+    }
+}

@@ -90,6 +90,20 @@ fn numbers_and_sizes_are_those_of_a_flood_fill() {
     assert!(without_distance > 10_000, "the pictures held {without_distance} disparities without a distance");
 }
 
+/// The surfaces that stay in a table for `room`, in their order: the largest, of equals those that come first.
+fn largest(sizes: &[usize], room: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    order.sort_by_key(|&i| (core::cmp::Reverse(sizes[i]), i));
+    let mut kept: Vec<usize> = order.into_iter().take(room).collect();
+    kept.sort_unstable();
+    kept
+}
+
+/// The place of a surface among those that stayed.
+fn place_among(kept: &[usize], label: Option<usize>) -> Option<usize> {
+    label.and_then(|label| kept.iter().position(|&k| k == label))
+}
+
 #[test]
 fn surfaces_of_coded_pixels_are_those_of_a_flood_fill_and_have_their_class() {
     const CLASSES: [SurfaceClass; CODES] =
@@ -127,7 +141,11 @@ fn surfaces_of_coded_pixels_are_those_of_a_flood_fill_and_have_their_class() {
             let report = small.run_coded(input.picture(), &depth, &rays, &CLASSES);
             assert_eq!(report.dropped as usize, sizes.len().saturating_sub(ROOM), "round {round}");
             full += usize::from(report.dropped > 0);
-            for (i, place) in places(&small, &input).into_iter().enumerate() {
+            let kept = largest(&sizes, ROOM);
+            let left: Vec<_> = labels.iter().map(|label| place_among(&kept, *label)).collect();
+            let found = places(&small, &input);
+            assert!(found == left, "round {round}: {} surfaces", sizes.len());
+            for (i, place) in found.into_iter().enumerate() {
                 let class = place.map(|place| small.table()[place].class);
                 assert!(class.is_none_or(|class| class == CLASSES[usize::from(codes[i])]), "round {round}");
             }
@@ -149,13 +167,9 @@ fn a_full_table_loses_the_smallest_and_says_how_many() {
         stage.configure(&input.settings, input.width, input.height).unwrap();
         let report = stage.run(input.picture(), &depth, &rays);
         let (mut labels, sizes) = plain(&input, |steps| steps > 16 && steps < DISPARITIES as u16 * 16);
-        // The largest stay; of equals those that come first.
-        let mut order: Vec<usize> = (0..sizes.len()).collect();
-        order.sort_by_key(|&i| (core::cmp::Reverse(sizes[i]), i));
-        let mut kept: Vec<usize> = order.into_iter().take(ROOM).collect();
-        kept.sort_unstable();
+        let kept = largest(&sizes, ROOM);
         for label in &mut labels {
-            *label = label.and_then(|label| kept.iter().position(|&k| k == label));
+            *label = place_among(&kept, *label);
         }
         assert!(places(&stage, &input) == labels, "round {round}: {} surfaces", sizes.len());
         let dropped = sizes.len().saturating_sub(ROOM);
@@ -182,6 +196,24 @@ fn a_tile_holds_the_most_surfaces_possible() {
         for x in 0..32 {
             assert_eq!(stage.place_at(x, y), Some(y / 4 * 8 + x / 4));
         }
+    }
+}
+
+#[test]
+fn a_tile_of_coded_pixels_holds_one_surface_less() {
+    // Those of the test above; beside two bits of a class there are six for a number.
+    let block = |i: usize| i / 32 / 4 * 8 + i % 32 / 4;
+    let code = |i: usize| (1 + block(i) % (CODES - 1)) as u8;
+    let alternate = |i: usize| if (i % 32 / 4 + i / 32 / 4).is_multiple_of(2) { 100 } else { 500 };
+    let pixels: Vec<_> = (0..32 * 32).map(|i| DisparityPixel::from_steps(alternate(i))).collect();
+    let classes = [SurfaceClass::Undefined, SurfaceClass::Ground, SurfaceClass::Slanted, SurfaceClass::Obstacle];
+    let mut stage = Box::new(Surfaces::<1024, 64>::new());
+    stage.configure(&SurfaceSettings { min_pixels: 16, ..SurfaceSettings::default() }, 32, 32).unwrap();
+    (0..32 * 32).zip(stage.codes_mut()).for_each(|(i, to)| *to = code(i));
+    stage.run_coded(DisparityPicture::new(&pixels, 32), &depth(), &rays(), &classes);
+    for i in 0..32 * 32 {
+        let class = stage.surface_at(i % 32, i / 32).map(|surface| surface.class);
+        assert_eq!(class, (block(i) < 63).then(|| classes[usize::from(code(i))]), "block {}", block(i));
     }
 }
 
