@@ -216,6 +216,30 @@ fn a_first_plane_is_forgiven_more() {
 }
 
 #[test]
+fn of_two_planes_that_were_tried_more_lies_on_the_one_that_is_found() {
+    let mut finder = finder(&settings());
+    let frame = finder.frame.unwrap();
+    // Level pieces of ground at a height, as far away and as many at each.
+    let pieces = |z: f32, rows: u16| {
+        (0..8 * rows).map(move |i| {
+            let mut surface = horizontal([1.0 + f32::from(i / 8) * 0.6, f32::from(i % 8) * 0.5 - 2.0, z]);
+            surface.points.covariance = SymmetricMatrix3 { xx: 0.02, yy: 0.02, ..SymmetricMatrix3::default() };
+            surface
+        })
+    };
+    let mut found = |above: u16, below: u16| {
+        finder.last = Some(level(0.4, 0.8, 0));
+        let table: Vec<_> = pieces(0.4, above).chain(pieces(0.0, below)).collect();
+        let plane = finder.find(&table, &Regions::<64>::new(), &frame, Height::OfMount);
+        plane.expect("either is plausible").offset_m
+    };
+    // The last plane lies 0.4 m high, that of the mount at none.
+    assert!((found(3, 2) - 0.4).abs() < 1.0e-4);
+    assert!(found(2, 3).abs() < 1.0e-4);
+    assert!((found(3, 3) - 0.4).abs() < 1.0e-4, "of equals the last frame's stays");
+}
+
+#[test]
 fn without_holding_no_plane_is_kept_and_detectors_exchange_theirs() {
     let world = World::level(1.2, 15.0, 0.0);
     let seen = world.render();

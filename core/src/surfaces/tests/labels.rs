@@ -210,7 +210,8 @@ fn a_tile_of_coded_pixels_holds_one_surface_less() {
     let mut stage = Box::new(Surfaces::<1024, 64>::new());
     stage.configure(&SurfaceSettings { min_pixels: 16, ..SurfaceSettings::default() }, 32, 32).unwrap();
     (0..32 * 32).zip(stage.codes_mut()).for_each(|(i, to)| *to = code(i));
-    stage.run_coded(DisparityPicture::new(&pixels, 32), &depth(), &rays(), &classes);
+    let report = stage.run_coded(DisparityPicture::new(&pixels, 32), &depth(), &rays(), &classes);
+    assert_eq!((report, stage.table().len()), (SurfaceReport { found: 63, dropped: 0 }, 63));
     for i in 0..32 * 32 {
         let class = stage.surface_at(i % 32, i / 32).map(|surface| surface.class);
         assert_eq!(class, (block(i) < 63).then(|| classes[usize::from(code(i))]), "block {}", block(i));
