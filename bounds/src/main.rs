@@ -14,9 +14,7 @@ mod taken;
 
 use std::{path::PathBuf, process::ExitCode};
 
-#[cfg(feature = "search")]
-use anyhow::Context;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 #[cfg(feature = "search")]
 use fencepost_work::search;
@@ -103,6 +101,15 @@ enum Command {
         #[arg(long)]
         write: bool,
     },
+    /// Prints what the bound of instructions of a stage is made of: the blocks of the code that take the most of it.
+    Blocks {
+        /// An image, as for `check`.
+        #[arg(long)]
+        image: PathBuf,
+        /// The stage.
+        #[arg(long)]
+        stage: String,
+    },
     /// Prints a budget that is what is found now.
     Budget {
         #[command(flatten)]
@@ -180,6 +187,17 @@ fn run(cli: &Cli) -> Result<bool> {
                 std::fs::write(worst, found.to_toml()?).with_context(|| format!("cannot write {}", worst.display()))?;
             }
             Ok(good)
+        }
+        Command::Blocks { image, stage } => {
+            let bounds = Figures::find(Some(image), None)?.instructions.unwrap_or_default();
+            let bound = bounds.iter().find(|bound| bound.stage == stage);
+            let names: Vec<_> = bounds.iter().map(|bound| bound.stage).collect();
+            let bound = bound.with_context(|| format!("`{stage}` has no bound in the image; {names:?} have one"))?;
+            println!("{} of {} instructions, by blocks", bound.stage, bound.instructions);
+            for share in &bound.blocks {
+                println!("{share}");
+            }
+            Ok(true)
         }
         Command::Budget { images, budget } => {
             let limits = budget::Budget::read(budget)?.limits;

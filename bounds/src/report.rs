@@ -127,7 +127,7 @@ fn instructions(bounds: &[Bound]) -> String {
         "\nINSTRUCTIONS for a frame of {width} x {height} x {disparities} on a Cortex-M7 with the default settings, at most;\n\
          milliseconds at 480 MHz, if there were one for each cycle\n"
     );
-    for Bound { stage, instructions, loops } in bounds {
+    for Bound { stage, instructions, loops, .. } in bounds {
         let ms = *instructions as f64 / 480.0e3;
         text += &format!("{instructions:>12}  {ms:>7.1} ms  {stage}, in {loops} loops of its machine code\n");
     }

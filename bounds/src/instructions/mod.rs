@@ -17,12 +17,32 @@ use program::{Program, rounds};
 pub(crate) const SIZE: (usize, usize, usize) = (320, 240, 48);
 
 /// What a stage takes at most.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Bound {
     pub(crate) stage: &'static str,
     pub(crate) instructions: u64,
     /// Loops of its machine code.
     pub(crate) loops: usize,
+    /// What it is made of: the blocks that run, those that take the most first.
+    pub(crate) blocks: Vec<Share>,
+}
+
+/// A block of the code in the worst of all ways that are not ruled out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Share {
+    pub(crate) address: u32,
+    pub(crate) function: String,
+    /// Lines of the core that it comes from, the first as far as it is known.
+    pub(crate) line: String,
+    pub(crate) length: u64,
+    pub(crate) times: u64,
+}
+
+impl core::fmt::Display for Share {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { address, function, line, length, times } = self;
+        write!(f, "{:>12} = {times:>9} x {length:>4}  {address:#x} {function}; {line}", length * times)
+    }
 }
 
 /// The bounds of all stages whose functions are in the image, and what keeps others from having one.
@@ -113,10 +133,29 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
     if !faults.is_empty() {
         return Err(faults.into_iter().map(told).collect());
     }
-    let Some(instructions) = program.most() else {
+    let Some((instructions, times)) = program.most() else {
         return Err(vec![told("the bounds of its loops do not bound it".to_owned())]);
     };
-    Ok(Some(Bound { stage: stage.name, instructions, loops }))
+    Ok(Some(Bound { stage: stage.name, instructions, loops, blocks: shares(image, &functions, &times) }))
+}
+
+/// The blocks that run, those that take the most first.
+fn shares(image: &Image, functions: &BTreeMap<u32, Graph>, times: &BTreeMap<(u32, usize), f64>) -> Vec<Share> {
+    let share = |(&(at, place), &times): (&(u32, usize), &f64)| {
+        let instructions = &functions[&at].blocks[place].instructions;
+        let chains = instructions.iter().map(|&address| Chain::of(image, address));
+        let line = chains.flat_map(|chain| chain.0.into_iter().next()).next();
+        Share {
+            address: instructions[0],
+            function: plain(image.name(at)),
+            line: line.map(|(file, line, text, _)| format!("{file}:{line}: {text}")).unwrap_or_default(),
+            length: instructions.len() as u64,
+            times: times.round() as u64,
+        }
+    };
+    let mut shares: Vec<_> = times.iter().map(share).filter(|share| share.times > 0).collect();
+    shares.sort_by_key(|share| core::cmp::Reverse(share.length * share.times));
+    shares
 }
 
 /// How often a line stands in the code of a loop: its instructions that go to memory, which nothing is saved of.

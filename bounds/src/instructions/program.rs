@@ -35,8 +35,8 @@ impl<'a> Program<'a> {
         self.limits.push((sum, most as f64));
     }
 
-    /// The most instructions; `None` if there is no most.
-    pub(super) fn most(&self) -> Option<u64> {
+    /// The most instructions, and how often each block runs then, by its function and number; `None` if there is no most.
+    pub(super) fn most(&self) -> Option<(u64, BTreeMap<(u32, usize), f64>)> {
         let same = self.same();
         let mut problem = Problem::new(OptimizationDirection::Maximize);
         let mut weights = BTreeMap::<Count, f64>::new();
@@ -82,8 +82,11 @@ impl<'a> Program<'a> {
             add(&mut problem, sum.clone(), ComparisonOp::Le, *most);
         }
         let solution = problem.solve().ok().filter(|outcome| outcome.is_optimal())?.into_solution().ok()?;
+        let blocks =
+            self.functions.iter().flat_map(|(&at, graph)| (0..graph.blocks.len()).map(move |place| (at, place)));
+        let times = blocks.map(|(at, place)| ((at, place), solution[variables[&same.of(Count::Block(at, place))]]));
         // Whole numbers of instructions: no more than what was found, of which the solver knows some twelve digits.
-        Some((solution.objective() * (1.0 + 1e-9) + 1e-3) as u64)
+        Some(((solution.objective() * (1.0 + 1e-9) + 1e-3) as u64, times.collect()))
     }
 
     /// Blocks that call each function.
@@ -189,7 +192,7 @@ mod tests {
         if let Some(calls) = calls {
             program.limit(vec![(Count::Block(0, 2), 1.0)], calls);
         }
-        program.most()
+        program.most().map(|(most, _)| most)
     }
 
     #[test]
