@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_bound_is_taken_instead_of_what_was_measured() {
-        let bound = Bound { stage: "map", instructions: 48_000_000, loops: 1 };
+        let bound = Bound { stage: "map", instructions: 48_000_000, loops: 1, blocks: Vec::new() };
         let platform = Platform::parse(EXAMPLE).unwrap();
         let whole_us = platform.latency(&[]).unwrap().processing_us;
         let latency = platform.latency(&[bound]).unwrap();

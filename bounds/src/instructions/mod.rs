@@ -11,7 +11,7 @@ use crate::{
     work::Shape,
 };
 use facts::{Fact, Most, Stage};
-use program::{Program, rounds};
+use program::{Program, Times, rounds};
 
 /// Width, height and disparities of the images whose machine code is looked at.
 pub(crate) const SIZE: (usize, usize, usize) = (320, 240, 48);
@@ -140,7 +140,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
 }
 
 /// The blocks that run, those that take the most first.
-fn shares(image: &Image, functions: &BTreeMap<u32, Graph>, times: &BTreeMap<(u32, usize), f64>) -> Vec<Share> {
+fn shares(image: &Image, functions: &BTreeMap<u32, Graph>, times: &Times) -> Vec<Share> {
     let share = |(&(at, place), &times): (&(u32, usize), &f64)| {
         let instructions = &functions[&at].blocks[place].instructions;
         let chains = instructions.iter().map(|&address| Chain::of(image, address));

@@ -17,6 +17,9 @@ pub(super) enum Count {
     Way(u32, usize, usize),
 }
 
+/// How often each block runs, by its function and its number.
+pub(super) type Times = BTreeMap<(u32, usize), f64>;
+
 /// Functions, and what is known about how often their blocks run.
 pub(super) struct Program<'a> {
     functions: &'a BTreeMap<u32, Graph>,
@@ -35,8 +38,8 @@ impl<'a> Program<'a> {
         self.limits.push((sum, most as f64));
     }
 
-    /// The most instructions, and how often each block runs then, by its function and number; `None` if there is no most.
-    pub(super) fn most(&self) -> Option<(u64, BTreeMap<(u32, usize), f64>)> {
+    /// The most instructions, and how often each block runs then; `None` if there is no most.
+    pub(super) fn most(&self) -> Option<(u64, Times)> {
         let same = self.same();
         let mut problem = Problem::new(OptimizationDirection::Maximize);
         let mut weights = BTreeMap::<Count, f64>::new();
