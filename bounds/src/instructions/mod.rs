@@ -32,7 +32,7 @@ pub(crate) struct Bound {
 pub(crate) struct Share {
     pub(crate) address: u32,
     pub(crate) function: String,
-    /// Lines of the core that it comes from, the first as far as it is known.
+    /// The first line of the core that is known of it: file, number and text; empty if there is none.
     pub(crate) line: String,
     pub(crate) length: u64,
     pub(crate) times: u64,
