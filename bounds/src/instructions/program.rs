@@ -182,7 +182,8 @@ mod tests {
         BTreeMap::from([(0, Graph { blocks }), (100, Graph { blocks: called })])
     }
 
-    fn limited(most: u64, calls: Option<u64>) -> Option<u64> {
+    /// The most instructions, and how often the blocks of both functions run then.
+    fn limited(most: u64, calls: Option<u64>) -> (u64, [u64; 7]) {
         let (functions, begun) = (functions(), BTreeMap::from([(0, 10)]));
         let mut program = Program::new(&functions, &begun);
         let found = functions[&100].loops();
@@ -195,15 +196,17 @@ mod tests {
         if let Some(calls) = calls {
             program.limit(vec![(Count::Block(0, 2), 1.0)], calls);
         }
-        program.most().map(|(most, _)| most)
+        let (most, times) = program.most().unwrap();
+        let times: Vec<_> = times.into_values().map(|times| times.round() as u64).collect();
+        (most, times.try_into().unwrap())
     }
 
     #[test]
     fn the_longer_way_is_taken_with_as_many_rounds_as_there_may_be() {
         // 1 + 7 + 2 and the call of 1 + 3 x 4 + 1, ten times.
-        assert_eq!(limited(4, None), Some(10 * (10 + 14)));
+        assert_eq!(limited(4, None), (10 * (10 + 14), [10, 0, 10, 10, 10, 40, 10]));
         // Six of ten take the other way.
-        assert_eq!(limited(4, Some(4)), Some(4 * (10 + 14) + 6 * 8));
+        assert_eq!(limited(4, Some(4)), (4 * (10 + 14) + 6 * 8, [10, 6, 4, 10, 4, 16, 4]));
     }
 
     #[test]
