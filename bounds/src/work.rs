@@ -96,6 +96,9 @@ impl Shape {
         [window_width, window_height].map(|edge| u64::from(edge) / 2 + REACH)
     }
 
+    /// Strips that are matched the other way round.
+    pub const EXCHANGED: u64 = EXCHANGED;
+
     /// Rows that go into the matcher, beside those of the picture, to be matched the other way round.
     pub fn exchanged_rows(&self) -> u64 {
         EXCHANGED * (2 * self.margins()[1] + 1)
@@ -122,27 +125,25 @@ impl Shape {
         StageWork::sum("rectify", loops, "2 (H + 8 (2 margin + 1)) (W + W/8 + 1)")
     }
 
-    fn matching(&self) -> StageWork {
+    /// What the loops of the matching take for so many pictures, and strips that are matched the other way round.
+    pub fn matching_of(&self, pictures: u64, strips: u64) -> Vec<(&'static str, u64)> {
         let Self { width, height, disparities, .. } = *self;
         let settings = &self.settings.matching;
         let [margin_x, margin_y] = self.margins();
-        let filtered = (height - 2 * REACH) + EXCHANGED * (2 * margin_y + 1 - 2 * REACH);
+        let strip = 2 * margin_y + 1;
+        let filtered = pictures * (height - 2 * REACH) + strips * (strip - 2 * REACH);
         let window_rows = u64::from(settings.window_height);
-        let slid = (2 * (height - 2 * REACH)).saturating_sub(window_rows)
-            + EXCHANGED * (2 * (2 * margin_y + 1 - 2 * REACH) - window_rows);
-        let rows = height - 2 * margin_y + EXCHANGED;
+        let slid = pictures * (2 * (height - 2 * REACH)).saturating_sub(window_rows)
+            + strips * (2 * (strip - 2 * REACH) - window_rows);
+        let rows = pictures * (height - 2 * margin_y) + strips;
         let narrow = width - 2 * margin_x;
         let wide_width = u64::from(settings.wide_window_width);
-        let wide = width.saturating_sub(2 * (wide_width / 2 + REACH));
-        // A start adds up the window; the first few have at least a third of its radius between them, the others all of it.
-        let short = wide_width / 2 / 3 + 1;
+        let wide = self.wide();
         let begun = wide_width * (SHORT_GAPS + 1 + wide / (wide_width + 1));
-        // Where it starts anew it does not go on: both together are less than each for itself.
-        let wide_and_begun = wide + wide_width * (SHORT_GAPS + 1) - short * SHORT_GAPS.min(wide / short);
         let runs = SHORT_GAPS + 1 + wide / (wide_width + 1);
         let decided = CHUNK * (narrow.div_ceil(CHUNK) + wide.div_ceil(CHUNK) + runs);
         let begun_narrow = u64::from(settings.window_width);
-        let loops = vec![
+        vec![
             ("filtered_pixels", 3 * width * filtered),
             ("column_costs_slid", width * disparities * slid),
             ("narrow_costs", rows * narrow * disparities),
@@ -151,8 +152,28 @@ impl Shape {
             ("decided_pixels", rows * decided),
             ("pixels_checked_back", rows * narrow),
             ("pixels_scanned_for_weak", rows * 2 * wide),
-        ];
-        let together = rows * disparities * (begun_narrow + wide_and_begun);
+        ]
+    }
+
+    /// Pixels of a row that have a wide window within it.
+    fn wide(&self) -> u64 {
+        self.width.saturating_sub(2 * (u64::from(self.settings.matching.wide_window_width) / 2 + REACH))
+    }
+
+    /// Columns that are summed for a row where a window starts, and pixels that the wide window goes on by.
+    pub fn columns_summed(&self) -> u64 {
+        let MatchSettings { window_width, wide_window_width, .. } = self.settings.matching;
+        let [begun_narrow, wide_width] = [window_width, wide_window_width].map(u64::from);
+        // A start adds up the window; the first few have at least a third of its radius between them, the others all of it.
+        let (short, wide) = (wide_width / 2 / 3 + 1, self.wide());
+        // Where it starts anew it does not go on: both together are less than each for itself.
+        begun_narrow + wide + wide_width * (SHORT_GAPS + 1) - short * SHORT_GAPS.min(wide / short)
+    }
+
+    fn matching(&self) -> StageWork {
+        let loops = self.matching_of(1, EXCHANGED);
+        let rows = self.height - 2 * self.margins()[1] + EXCHANGED;
+        let together = rows * self.disparities * self.columns_summed();
         let apart = loops.iter().filter(|(name, _)| !["wide_costs", "costs_begun_afresh"].contains(name));
         let total = apart.map(|(_, steps)| steps).sum::<u64>() + together;
         let formula = "W D (rows in and out) + rows D (W - 2 margin + W - 2 wide margin + 5 wide window + narrow window) + 10 W H";

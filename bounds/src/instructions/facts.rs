@@ -9,6 +9,8 @@ use crate::work::Shape;
 pub(super) enum At {
     /// A file of the core, and part of the line that leads back to the head of the loop.
     Line(&'static str, &'static str),
+    /// The same in one function of the image, which comes first.
+    LineOf(&'static str, &'static str, &'static str),
     /// All loops of a function.
     Function(&'static str),
     /// A loop of a function by its number, in the order of their addresses.
@@ -35,6 +37,8 @@ pub(super) struct Fact {
     pub(super) written: usize,
     /// Loops that take so many steps together, by a name that [`Stage::groups`] has.
     pub(super) group: Option<&'static str>,
+    /// Of these, for each step of this loop.
+    pub(super) weight: u64,
     /// Whether it is told of every stage, and need not be in each.
     pub(super) is_shared: bool,
 }
@@ -48,6 +52,11 @@ impl Fact {
 
     const fn of(mut self, group: &'static str) -> Self {
         self.group = Some(group);
+        self
+    }
+
+    const fn weighs(mut self, weight: u64) -> Self {
+        self.weight = weight;
         self
     }
 
@@ -65,6 +74,7 @@ impl Fact {
     pub(super) fn place(&self) -> String {
         match self.at {
             At::Line(file, text) => format!("{file}: {text}"),
+            At::LineOf(name, file, text) => format!("{file}: {text} in {name}"),
             At::Function(name) => name.to_owned(),
             At::LoopOf(name, nth) => format!("loop {nth} of {name}"),
             At::Unwritten(name) => format!("the loop without a line of {name}"),
@@ -84,11 +94,27 @@ pub(super) struct Stage {
 }
 
 const fn total(file: &'static str, text: &'static str, more: u64) -> Fact {
-    Fact { at: At::Line(file, text), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
+    Fact {
+        at: At::Line(file, text),
+        most: Most { each: 0, more },
+        by: 1,
+        written: 1,
+        group: None,
+        weight: 1,
+        is_shared: false,
+    }
 }
 
 const fn each(file: &'static str, text: &'static str, each: u64) -> Fact {
-    Fact { at: At::Line(file, text), most: Most { each, more: 0 }, by: 1, written: 1, group: None, is_shared: false }
+    Fact {
+        at: At::Line(file, text),
+        most: Most { each, more: 0 },
+        by: 1,
+        written: 1,
+        group: None,
+        weight: 1,
+        is_shared: false,
+    }
 }
 
 pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
@@ -99,7 +125,6 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
     };
     let (width, height) = (shape.width, shape.height);
     let pixels = width * height;
-    let rows = 2 * (height + shape.exchanged_rows());
     let rows_of_tiles = height * width.div_ceil(32);
     let (tiles_down, tiles) = (height.div_ceil(32), height.div_ceil(32) * width.div_ceil(32));
     let cells = shape.settings.map.geometry.len() as u64;
@@ -107,21 +132,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
     let limit = shape.wire_runs.min(cells);
     let terrain_rows = 3 * height.div_ceil(2);
     vec![
-        Stage {
-            name: "rectify",
-            entries: vec![("entry_rectify_row", rows)],
-            facts: [
-                vec![
-                    total("rectify/sample.rs", "for chunk in", rows * (width / 8)),
-                    each("rectify/mod.rs", "for (to, from) in copied", width),
-                    each("rectify/sample.rs", "for pixel in out {", 8),
-                ],
-                library([width / 4; 2], [0; 2]),
-            ]
-            .concat(),
-            calls: vec![],
-            groups: vec![],
-        },
+        rectify(width, 2 * height),
         Stage {
             name: "validate",
             entries: vec![("entry_validate_run", 1)],
@@ -321,8 +332,28 @@ Stage {
             ],
             groups: vec![],
         },
-        matching::stage(shape, &of),
+        matching::picture(shape),
+        matching::exchange(shape),
     ]
+}
+
+/// Rows that are rectified.
+fn rectify(width: u64, rows: u64) -> Stage {
+    Stage {
+        name: "rectify",
+        entries: vec![("entry_rectify_row", rows)],
+        facts: [
+            vec![
+                each("rectify/sample.rs", "for chunk in", width / 8),
+                each("rectify/mod.rs", "for (to, from) in copied", width),
+                each("rectify/sample.rs", "for pixel in out {", 8),
+            ],
+            library([width / 4; 2], [0; 2]),
+        ]
+        .concat(),
+        calls: vec![],
+        groups: vec![],
+    }
 }
 
 /// A loop that goes down the heap of the wire.
@@ -333,6 +364,7 @@ const fn sifts(text: &'static str, more: u64) -> Fact {
         by: 1,
         written: 1,
         group: None,
+        weight: 1,
         is_shared: false,
     }
 }
@@ -370,16 +402,34 @@ fn regions(shape: &Shape, times: u64, of: &dyn Fn(&str, &str) -> u64) -> Vec<Fac
 
 /// The loop of a function that no line leads back to the head of.
 const fn unwritten(name: &'static str, more: u64) -> Fact {
-    Fact { at: At::Unwritten(name), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
+    Fact {
+        at: At::Unwritten(name),
+        most: Most { each: 0, more },
+        by: 1,
+        written: 1,
+        group: None,
+        weight: 1,
+        is_shared: false,
+    }
 }
 
-/// The first loop of a function, around all others.
-const fn outermost(name: &'static str, more: u64) -> Fact {
-    Fact { at: At::LoopOf(name, 0), most: Most { each: 0, more }, by: 1, written: 1, group: None, is_shared: false }
+/// A line of the core in one function.
+const fn line_of(name: &'static str, file: &'static str, text: &'static str, more: u64) -> Fact {
+    let mut fact = total(file, text, more);
+    fact.at = At::LineOf(name, file, text);
+    fact
 }
 
 const fn function(name: &'static str, each: u64, more: u64) -> Fact {
-    Fact { at: At::Function(name), most: Most { each, more }, by: 1, written: 1, group: None, is_shared: false }
+    Fact {
+        at: At::Function(name),
+        most: Most { each, more },
+        by: 1,
+        written: 1,
+        group: None,
+        weight: 1,
+        is_shared: false,
+    }
 }
 
 /// Fills of `bytes` in all, and of `words` beside.
@@ -390,6 +440,7 @@ fn fills(bytes: u64, words: u64) -> Vec<Fact> {
         by: 1,
         written: 1,
         group: None,
+        weight: 1,
         is_shared: false,
     };
     vec![fact(0, bytes), fact(1, bytes / 4 + words), fact(2, bytes)]
@@ -400,7 +451,7 @@ fn fills(bytes: u64, words: u64) -> Vec<Fact> {
 fn library([aligned, each]: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
     let fact = |name, nth, each, more| {
         let most = Most { each, more };
-        Fact { at: At::LoopOf(name, nth), most, by: 1, written: 1, group: None, is_shared: true }
+        Fact { at: At::LoopOf(name, nth), most, by: 1, written: 1, group: None, weight: 1, is_shared: true }
     };
     let mut facts = Vec::new();
     for name in ["__aeabi_memclr", "__aeabi_memset"] {

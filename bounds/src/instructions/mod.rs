@@ -90,7 +90,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
                 .iter()
                 .any(|&(other, outer)| other == number && outer.head != one.head && outer.blocks.contains(&one.head));
             let (rounds, entered) = rounds(at, graph, one, is_inner, calls.get(&at).map_or(&[], Vec::as_slice));
-            let Fact { most: Most { each, more }, by, written, .. } = stage.facts[number];
+            let Fact { most: Most { each, more }, by, written, weight, .. } = stage.facts[number];
             let times = times_written(image, graph, &found, one, &stage.facts[number]);
             if times < written {
                 let address = graph.blocks[one.head].instructions[0];
@@ -100,7 +100,8 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
                 ));
             }
             if let Some(group) = stage.facts[number].group {
-                let steps = rounds.iter().map(|(count, factor)| (*count, factor * by as f64));
+                let weight = (by as u64 * weight) as f64;
+                let steps = rounds.iter().map(|(count, factor)| (*count, factor * weight));
                 groups.entry(group).or_default().extend(steps);
             }
             let rounds = rounds.into_iter().map(|(count, factor)| (count, factor * by as f64));
@@ -250,6 +251,9 @@ impl Place {
     fn is(&self, fact: &Fact) -> bool {
         match fact.at {
             facts::At::Line(file, text) => self.lines.iter().any(|chain| chain.is(file, text)),
+            facts::At::LineOf(name, file, text) => {
+                self.function == name && self.lines.iter().any(|chain| chain.is(file, text))
+            }
             facts::At::Function(name) => self.function == name,
             facts::At::Unwritten(name) => self.function == name && self.lines.is_empty(),
             facts::At::LoopOf(name, nth) => self.function == name && self.nth == nth,

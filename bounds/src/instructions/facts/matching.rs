@@ -2,33 +2,52 @@
 
 use fencepost_core::matching::{MatchSettings, Prefilter};
 
-use super::{Stage, each, library, outermost, total, unwritten};
+use super::{Stage, each, library, line_of, rectify, total, unwritten};
 use crate::work::Shape;
 
-/// The matching by census with the instructions of the processor: the other ways that are linked along are not gone.
-pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
-    let of = |name| of("match", name);
+/// The matching of the picture: each row that comes is asked for one that goes until there is none.
+pub(super) fn picture(shape: &Shape) -> Stage {
+    facts("match", shape, [1, 0], [shape.height, 2 * shape.height])
+}
+
+/// Strips that are rectified and matched the other way round where hardly anything matches, of which one row each is asked for.
+pub(super) fn exchange(shape: &Shape) -> Stage {
+    let (strips, pushed) = (Shape::EXCHANGED, shape.exchanged_rows());
+    let rows = rectify(shape.width, 2 * pushed);
+    let mut stage = facts("exchange", shape, [0, strips], [pushed, strips]);
+    stage.entries.extend(rows.entries);
+    // Its own come first: of the memory functions what is said of the matching is true of both.
+    stage.facts.extend(rows.facts);
+    stage
+}
+
+/// The matching by census with the instructions of the processor, of a picture or of strips, where `begins` pictures are begun, `pushed`
+/// rows come, and `pulled` times one that goes is asked for: the other ways that are linked along are not gone.
+fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushed, pulled]: [u64; 2]) -> Stage {
+    let begins = pictures + strips;
+    let loops = shape.matching_of(pictures, strips);
+    let of = |name| loops.iter().find(|(other, _)| *other == name).expect("a loop").1;
     let settings = &shape.settings.matching;
     let (width, disparities) = (shape.width, shape.disparities);
-    let pushed = shape.height + shape.exchanged_rows();
     let [narrow, wide] = ["narrow_costs", "wide_costs"].map(|name| of(name) / disparities);
     let (decided, scanned) = (of("decided_pixels"), of("pixels_scanned_for_weak"));
     let chunks = decided / 64;
     let filtered = of("filtered_pixels") / 3;
     let margin = u64::from(settings.window_height) / 2 + 3;
-    let rows = shape.height - 2 * margin + 8;
+    let rows = pictures * (shape.height - 2 * margin) + strips;
     let blocks = disparities.div_ceil(8);
     let starts = of("costs_begun_afresh") / disparities;
     // Chunks of a row that is gone through as a whole: what comes on top of them begins afresh.
     let narrow_chunks = rows * (narrow / rows).div_ceil(64);
     let wide_chunks = narrow_chunks + rows * (wide / rows).div_ceil(64);
-    // Pixels of which not all places are candidates: near the left end of a row, and near the right end of the other picture's.
-    let cut = 2 * rows * disparities;
+    let edges = Edges::of(disparities);
+    // Of each row that both windows go along.
+    let on_edges = |of_a_row: u64| 2 * rows * of_a_row;
+    let pixels = |name, most| line_of(name, "arch/thumb/search.rs", "for (i, x) in (0..CHUNK)", most);
     let never = |file, text| total(file, text, 0);
     Stage {
-        name: "match",
-        // Each row that comes is asked for one that goes until there is none.
-        entries: vec![("entry_match_begin", 9), ("entry_match_push", pushed), ("entry_match_pull", 2 * pushed)],
+        name,
+        entries: vec![("entry_match_begin", begins), ("entry_match_push", pushed), ("entry_match_pull", pulled)],
         facts: [
             vec![
                 never("arch/plain.rs", ""),
@@ -50,16 +69,16 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 total(
                     "arch/thumb/slide.rs",
                     "for (x, &left_in) in (0..width).zip(enter.left)",
-                    9 * u64::from(settings.window_height) * width,
+                    begins * u64::from(settings.window_height) * width,
                 )
                 .of("rows in"),
                 total(
                     "arch/thumb/slide.rs",
                     "for (sums, right_in)",
-                    9 * u64::from(settings.window_height) * width * disparities / 4,
+                    begins * u64::from(settings.window_height) * width * disparities / 4,
                 ),
                 // Rows that go.
-                total("matching/mod.rs", "out.fill(DisparityPixel", 2 * pushed * width).by(2),
+                total("matching/mod.rs", "out.fill(DisparityPixel", pulled * width).by(2),
                 total("matching/mod.rs", "weak.contains(&true)", rows * width).early(4),
                 each("matching/rows.rs", "(first..y.saturating_add(radius))", u64::from(settings.window_height) + 2),
                 total("matching/best.rs", "self.tables.as_flattened_mut().fill", rows * 3 * width).by(32),
@@ -102,27 +121,29 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 total("arch/decide.rs", "for ((back, &disparity), x)", 64 * narrow_chunks).by(4),
                 total("arch/decide.rs", "for (pixel, (&disparity, &back))", narrow).by(4).written(8),
                 // The search, pixel by pixel and block by block.
-                outermost("fencepost_core::arch::thumb::search::search_keys", narrow),
-                outermost("fencepost_core::arch::thumb::search::search_costs", wide),
+                pixels("fencepost_core::arch::thumb::search::search_keys", narrow),
+                pixels("fencepost_core::arch::thumb::search::search_costs", wide).weighs(2 * blocks).of("columns"),
                 total("arch/thumb/search.rs", "asm!( <- self.key_blocks(", narrow * blocks).of("blocks"),
                 total("arch/thumb/search.rs", "asm!( <- self.cost_blocks(", wide * blocks).of("wide blocks"),
                 total("arch/thumb/search.rs", "asm!( <- self.least()", (narrow + wide) * blocks),
                 total("arch/thumb/search.rs", "asm!( <- self.next_below(", (narrow + wide) * (blocks + 4)),
                 each("arch/thumb/search.rs", ">= AMBIGUOUS", 4),
-                total("arch/thumb/search.rs", "near = inside.fold", 8 * 2 * cut).by(4),
-                total("arch/thumb/search.rs", "for block in 0..first <- costs.go_on::<true>", narrow * blocks)
+                total("arch/thumb/search.rs", "near = inside.fold", on_edges(edges.partly)).by(4),
+                total("arch/thumb/search.rs", "for block in 0..first <- costs.go_on::<true>", rows * edges.blocks)
                     .of("blocks"),
-                total("arch/thumb/search.rs", "for block in 0..first <- costs.go_on::<false>", wide * blocks)
+                total("arch/thumb/search.rs", "for block in 0..first <- costs.go_on::<false>", rows * edges.blocks)
                     .of("wide blocks"),
-                total("arch/thumb/search.rs", "for place in candidates.start.max", cut * (8 + disparities.div_ceil(2))),
-                total("arch/thumb/search.rs", "for x in range.clone() || let four = unsafe", starts * 2 * blocks).by(4),
+                total("arch/thumb/search.rs", "for place in candidates.start.max", on_edges(edges.places)),
+                total("arch/thumb/search.rs", "for x in range.clone() || let four = unsafe", starts * 2 * blocks)
+                    .by(4)
+                    .of("columns"),
                 each("arch/thumb/search.rs", "for word in 0..words", 2 * blocks),
                 total("arch/thumb/search.rs", "(0..self.blocks).find(", wide * blocks).early(4),
                 total("arch/thumb/search.rs", "places.clone().find(", wide * 8).early(4),
                 unwritten("fencepost_core::matching::Matcher::pass", chunks + 2 * rows),
             ],
-            // Rows, and the sums of all columns of nine pictures and strips that begin.
-            library([32, width / 4], [9 * (width * disparities / 2 + width), 0]),
+            // Rows, and the sums of all columns of pictures and strips that begin.
+            library([32, width / 4], [begins * (width * disparities / 2 + width), 0]),
         ]
         .concat(),
         calls: vec![
@@ -131,10 +152,67 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
             ("fencepost_core::arch::thumb::search::search_costs", chunks - narrow_chunks),
             ("fencepost_core::arch::thumb::search::Costs::begin", chunks - wide_chunks + rows),
         ],
-        groups: vec![("rows in", filtered), ("blocks", narrow * blocks), ("wide blocks", wide * blocks)],
+        groups: vec![
+            ("rows in", filtered),
+            ("blocks", narrow * blocks),
+            ("wide blocks", wide * blocks),
+            // Words of columns: where the wide window starts anew it does not go on.
+            ("columns", rows * shape.columns_summed() * 2 * blocks),
+        ],
+    }
+}
+
+/// What the ends of a row take, where not all places of a pixel are candidates: the next pixel has one more or one less, and there are
+/// as many of these pixels at either end as there are places but one.
+struct Edges {
+    /// Blocks of eight places that are gone through place by place: those in front of the first that is whole at the left end, all at the
+    /// right end.
+    blocks: u64,
+    /// Candidates in these blocks.
+    places: u64,
+    /// Those in blocks that have others beside them, of which each pixel has one.
+    partly: u64,
+}
+
+impl Edges {
+    fn of(disparities: u64) -> Self {
+        let cut = 1..disparities;
+        let partly = cut.clone().map(|missing| (8 - missing % 8) % 8).sum::<u64>();
+        let blocks = cut.clone().map(|missing| missing.div_ceil(8) + disparities.div_ceil(8)).sum();
+        Self { blocks, places: partly + cut.sum::<u64>(), partly: 2 * partly }
     }
 }
 
 fn grey(settings: &MatchSettings) -> bool {
     settings.prefilter == Prefilter::Grey
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ends_of_a_row_take_what_their_pixels_take_one_by_one() {
+        for disparities in [16, 48, 128] {
+            let (mut blocks, mut places, mut partly) = (0, 0, 0);
+            // As the search goes along: columns of the left picture, the right one's from 200 up to 600.
+            for x in 0..1000_u64 {
+                let largest = (disparities - 1).min(x.saturating_sub(200));
+                let smallest = (x + 1).saturating_sub(600);
+                if x < 200 || largest < smallest {
+                    continue;
+                }
+                let candidates = disparities - 1 - largest..disparities - smallest;
+                let is_candidate = |place: &u64| candidates.contains(place);
+                let of_block = |block: u64| (8 * block..8 * block + 8).filter(is_candidate).count() as u64;
+                let all = 0..disparities / 8;
+                let first = if candidates.end == disparities { candidates.start.div_ceil(8) } else { disparities / 8 };
+                blocks += first;
+                places += (0..first).map(of_block).sum::<u64>();
+                partly += all.map(of_block).filter(|count| (1..8).contains(count)).sum::<u64>();
+            }
+            let edges = Edges::of(disparities);
+            assert_eq!([edges.blocks, edges.places, edges.partly], [blocks, places, partly], "{disparities}");
+        }
+    }
 }

@@ -173,6 +173,11 @@ impl Costs {
     unsafe fn go_on<const KEYS: bool>(&self, pixel: &Pixel, candidates: &Range<usize>) -> Option<u16> {
         // SAFETY: that of this function.
         unsafe {
+            if candidates.is_empty() {
+                // Nothing is to be found; the costs go on all the same.
+                self.cost_blocks(pixel, 0);
+                return None;
+            }
             // Candidates are missing in front near the left edge; only odd spans of valid columns make them end early.
             let whole = candidates.end == self.blocks.wrapping_mul(BLOCK);
             let first = if whole { candidates.start.div_ceil(BLOCK) } else { self.blocks };
@@ -185,9 +190,6 @@ impl Costs {
                 } else {
                     self.cost_blocks(pixel, first);
                 }
-            }
-            if candidates.is_empty() {
-                return None;
             }
             let all = self.least();
             Some((all as u16).min((all >> 16) as u16))
