@@ -325,31 +325,45 @@ fn scale(stage: &str, numbers: &[u32; 12]) -> usize {
     if stage == "rectify" { 1 + (numbers[10] % 4) as usize } else { 1 }
 }
 
-/// Cameras as the numbers say; for rectifying they may be turned.
+/// Cameras as the numbers say, as the search has them. For rectifying they may be turned or see nothing but their last pixel; for
+/// matching the right one may look past its picture.
 fn calibration(stage: &str, numbers: &[u32; 12]) -> StereoCalibration {
-    let (number, scale) = (numbers[9], scale(stage, numbers));
-    let pair = pair();
-    if stage != "rectify" {
-        return StereoCalibration::Rectified(pair);
-    }
-    let angle = ((number % 180) as f32).to_radians();
-    let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
-    let turn = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]];
-    let focal = pair.focal_px * (1.0 + (number / 180 % 4) as f32);
+    let (number, how, scale) = (numbers[9], numbers[11], scale(stage, numbers));
+    let mut pair = pair();
     let times = scale as f32;
-    let camera = CameraModel {
+    let mut camera = CameraModel {
         width: (scale * WIDTH) as u32,
         height: (scale * HEIGHT) as u32,
-        fx: times * focal,
-        fy: times * focal,
+        fx: times * pair.focal_px,
+        fy: times * pair.focal_px,
         cx: times * pair.cx,
         cy: times * pair.cy,
         distortion: Distortion::default(),
     };
+    let mut right = camera;
+    let mut angle = 0.0;
+    match stage {
+        "rectify" if how % 2 == 1 => {
+            pair.focal_px = 1.0e5;
+            (camera.fx, camera.fy) = (1.0, 1.0);
+            (camera.cx, camera.cy) = (camera.width as f32 - 1.0, camera.height as f32 - 1.0);
+            right = camera;
+        }
+        "rectify" => {
+            angle = ((number % 180) as f32).to_radians();
+            camera.fx *= (1 + number / 180 % 4) as f32;
+            camera.fy = camera.fx;
+            right = camera;
+        }
+        "match" if how % 4 == 3 => right.cx += (number % 64) as f32,
+        _ => return StereoCalibration::Rectified(pair),
+    }
+    let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
+    let turn = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]];
     let none = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     StereoCalibration::Raw(RawPair {
         left: camera,
-        right: camera,
+        right,
         rotation: none,
         translation_m: [-pair.baseline_m, 0.0, 0.0],
         rectification: Some(Rectification { left_rotation: turn, right_rotation: turn, pair }),

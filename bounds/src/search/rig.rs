@@ -77,7 +77,7 @@ macro_rules! rig {
                 let settings = self.shape().settings;
                 match stage {
                     "rectify" | "match" | "health" => {
-                        let calibration = calibration($width, $height, stage, genome.numbers[9]);
+                        let calibration = calibration($width, $height, stage, &genome.numbers);
                         let mount = Mount { height_m: Some(1.0), ..Mount::default() };
                         self.detector.configure(&settings, &calibration, &mount).expect("it can be configured");
                         let pair = genome.pair(($width, $height));
@@ -196,28 +196,44 @@ fn level(rays: &Rays, pair: &RectifiedPair) -> std::vec::Vec<DisparityPixel> {
     (0..width * height).map(|i| pixel(i % width, i / width)).collect()
 }
 
-/// Cameras as `number` says; for rectifying they may be turned, so far that rows of the pair run across those of the picture.
-fn calibration(width: usize, height: usize, stage: &str, number: u32) -> StereoCalibration {
-    let pair = pair(width, height);
-    if stage != "rectify" {
-        return StereoCalibration::Rectified(pair);
-    }
-    let (sin, cos) = ((number % 180) as f32).to_radians().sin_cos();
-    let turn = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]];
-    let focal = pair.focal_px * (1.0 + (number / 180 % 4) as f32);
-    let camera = CameraModel {
+/// Cameras as the numbers say. For rectifying they may be turned, so far that rows of the pair run across those of the picture, or see
+/// nothing but their last pixel; for matching the right one may look past its picture, so that its rows end early.
+fn calibration(width: usize, height: usize, stage: &str, numbers: &[u32; 12]) -> StereoCalibration {
+    let mut pair = pair(width, height);
+    let (number, how) = (numbers[9], numbers[11]);
+    let mut camera = CameraModel {
         width: width as u32,
         height: height as u32,
-        fx: focal,
-        fy: focal,
+        fx: pair.focal_px,
+        fy: pair.focal_px,
         cx: pair.cx,
         cy: pair.cy,
         distortion: Distortion::default(),
     };
+    let mut right = camera;
+    let (mut sin, mut cos) = (0.0, 1.0);
+    match stage {
+        "rectify" if how % 2 == 1 => {
+            // Next to no angle at all.
+            pair.focal_px = 1.0e5;
+            (camera.fx, camera.fy) = (1.0, 1.0);
+            (camera.cx, camera.cy) = (width as f32 - 1.0, height as f32 - 1.0);
+            right = camera;
+        }
+        "rectify" => {
+            (sin, cos) = ((number % 180) as f32).to_radians().sin_cos();
+            camera.fx *= (1 + number / 180 % 4) as f32;
+            camera.fy = camera.fx;
+            right = camera;
+        }
+        "match" if how % 4 == 3 => right.cx += (number % 64) as f32,
+        _ => return StereoCalibration::Rectified(pair),
+    }
+    let turn = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]];
     let none = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     StereoCalibration::Raw(RawPair {
         left: camera,
-        right: camera,
+        right,
         rotation: none,
         translation_m: [-pair.baseline_m, 0.0, 0.0],
         rectification: Some(Rectification { left_rotation: turn, right_rotation: turn, pair }),

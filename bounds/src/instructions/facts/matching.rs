@@ -128,7 +128,7 @@ fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushe
                 total("arch/thumb/search.rs", "asm!( <- self.least()", (narrow + wide) * blocks),
                 total("arch/thumb/search.rs", "asm!( <- self.next_below(", (narrow + wide) * (blocks + 4)),
                 each("arch/thumb/search.rs", ">= AMBIGUOUS", 4),
-                total("arch/thumb/search.rs", "near = inside.fold", on_edges(edges.partly)).by(4),
+                total("arch/thumb/search.rs", "places.fold(0u32, |near", on_edges(edges.partly)).by(4),
                 total("arch/thumb/search.rs", "for block in 0..first <- costs.go_on::<true>", rows * edges.blocks)
                     .of("blocks"),
                 total("arch/thumb/search.rs", "for block in 0..first <- costs.go_on::<false>", rows * edges.blocks)
@@ -151,6 +151,7 @@ fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushe
             ("fencepost_core::arch::thumb::search::search_keys", narrow_chunks),
             ("fencepost_core::arch::thumb::search::search_costs", chunks - narrow_chunks),
             ("fencepost_core::arch::thumb::search::Costs::begin", chunks - wide_chunks + rows),
+            ("fencepost_core::arch::thumb::search::Costs::below_at_edge", on_edges(edges.parts)),
         ],
         groups: vec![
             ("rows in", filtered),
@@ -170,7 +171,9 @@ struct Edges {
     blocks: u64,
     /// Candidates in these blocks.
     places: u64,
-    /// Those in blocks that have others beside them, of which each pixel has one.
+    /// Blocks that have candidates and other places, of which each pixel has one at most.
+    parts: u64,
+    /// Candidates in these.
     partly: u64,
 }
 
@@ -179,7 +182,8 @@ impl Edges {
         let cut = 1..disparities;
         let partly = cut.clone().map(|missing| (8 - missing % 8) % 8).sum::<u64>();
         let blocks = cut.clone().map(|missing| missing.div_ceil(8) + disparities.div_ceil(8)).sum();
-        Self { blocks, places: partly + cut.sum::<u64>(), partly: 2 * partly }
+        let parts = 2 * cut.clone().filter(|missing| missing % 8 != 0).count() as u64;
+        Self { blocks, places: partly + cut.sum::<u64>(), parts, partly: 2 * partly }
     }
 }
 
@@ -194,7 +198,7 @@ mod tests {
     #[test]
     fn the_ends_of_a_row_take_what_their_pixels_take_one_by_one() {
         for disparities in [16, 48, 128] {
-            let (mut blocks, mut places, mut partly) = (0, 0, 0);
+            let (mut blocks, mut places, mut parts, mut partly) = (0, 0, 0, 0);
             // As the search goes along: columns of the left picture, the right one's from 200 up to 600.
             for x in 0..1000_u64 {
                 let largest = (disparities - 1).min(x.saturating_sub(200));
@@ -209,10 +213,16 @@ mod tests {
                 let first = if candidates.end == disparities { candidates.start.div_ceil(8) } else { disparities / 8 };
                 blocks += first;
                 places += (0..first).map(of_block).sum::<u64>();
-                partly += all.map(of_block).filter(|count| (1..8).contains(count)).sum::<u64>();
+                let of_parts: Vec<_> = all.map(of_block).filter(|count| (1..8).contains(count)).collect();
+                parts += of_parts.len() as u64;
+                partly += of_parts.iter().sum::<u64>();
             }
             let edges = Edges::of(disparities);
-            assert_eq!([edges.blocks, edges.places, edges.partly], [blocks, places, partly], "{disparities}");
+            assert_eq!(
+                [edges.blocks, edges.places, edges.parts, edges.partly],
+                [blocks, places, parts, partly],
+                "{disparities}"
+            );
         }
     }
 }

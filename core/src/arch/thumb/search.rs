@@ -444,7 +444,7 @@ impl Costs {
                     }
                 } else {
                     let inside = candidates.start.max(first)..candidates.end.min(first.wrapping_add(BLOCK));
-                    near = inside.fold(near, |near, place| near.wrapping_add(u32::from(self.at(place) < cost)));
+                    near = near.wrapping_add(self.below_at_edge(inside, cost));
                 }
             }
             if (near & 0xffff) + (near >> 16) >= AMBIGUOUS {
@@ -453,6 +453,17 @@ impl Costs {
             block = block.wrapping_add(1);
         }
         ((near & 0xffff) + (near >> 16)) as u16
+    }
+
+    /// How many of some places have a cost below `cost`. Only pixels at the ends of a row have blocks of which not all places are
+    /// candidates.
+    ///
+    /// # Safety
+    /// That of [`Self::at`].
+    #[inline(never)]
+    unsafe fn below_at_edge(&self, places: Range<usize>, cost: u16) -> u32 {
+        // SAFETY: that of this function.
+        places.fold(0u32, |near, place| near.wrapping_add(u32::from(unsafe { self.at(place) } < cost)))
     }
 
     /// The first candidate of cost `cost`; there is one.
