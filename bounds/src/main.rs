@@ -97,6 +97,10 @@ enum Command {
         /// Writes the pictures that are known for `fencepost-worst` in bounds/image.
         #[arg(long)]
         inputs: Option<PathBuf>,
+        /// Climbs on the instructions that the stages take on the microcontroller that QEMU simulates, and not on steps: the program
+        /// `fencepost-worst` of bounds/image.
+        #[arg(long)]
+        image: Option<PathBuf>,
         /// Keeps what was found.
         #[arg(long)]
         write: bool,
@@ -175,12 +179,19 @@ fn run(cli: &Cli) -> Result<bool> {
             Ok(taken.is_good())
         }
         #[cfg(feature = "search")]
-        Command::Search { worst, rounds, seed, stage, inputs, write } => {
+        Command::Search { worst, rounds, seed, stage, inputs, image, write } => {
             println!("seed {seed}");
-            let (text, good, found) = search::search(&search::Worst::read(worst)?, *rounds, *seed, stage.as_deref());
+            let (known, stage) = (search::Worst::read(worst)?, stage.as_deref());
+            let (text, good, found) = match image {
+                Some(image) => {
+                    let (text, found) = search::search_instructions(&known, *rounds, *seed, stage, image)?;
+                    (text, true, found)
+                }
+                None => search::search(&known, *rounds, *seed, stage),
+            };
             print!("{text}");
             if let Some(inputs) = inputs {
-                let bytes = search::inputs(&search::Worst::read(worst)?);
+                let bytes = search::inputs(&known);
                 std::fs::write(inputs, bytes).with_context(|| format!("cannot write {}", inputs.display()))?;
             }
             if *write {

@@ -3,6 +3,7 @@
 mod attack;
 mod genome;
 mod rig;
+mod simulator;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -17,6 +18,7 @@ use crate::work::{Shape, StageWork};
 pub use attack::{Attack, Outcome};
 use genome::{Genome, Random};
 use rig::{Rig, Robot, Small, Taken};
+pub use simulator::search_instructions;
 
 /// Least share of the bound that the best attack on every stage has to reach, percent.
 const NEAR_PERCENT: f64 = 90.0;
@@ -146,26 +148,8 @@ impl<'a> Trial<'a> {
         total
     }
 
-    /// The best of a few starts, each changed as long as it does not get better by it.
     fn climb(&mut self, known: &[Genome], rounds: usize, seed: u32) -> Genome {
-        let mut random = Random::seeded(seed);
-        let mut candidates: Vec<Genome> = known.to_vec();
-        candidates.extend((0..rounds / 2).map(|_| Genome::random(&mut random)));
-        let mut scored: Vec<(u64, Genome)> =
-            candidates.into_iter().map(|genome| (self.steps(&genome), genome)).collect();
-        scored.sort_by_key(|(steps, _)| std::cmp::Reverse(*steps));
-        scored.truncate(3.max(known.len()));
-        for (steps, genome) in &mut scored {
-            for _ in 0..rounds / 2 {
-                let changed = genome.changed(&mut random);
-                let now = self.steps(&changed);
-                // As many is as good: on a plain one has to walk.
-                if now > *steps || (now == *steps && changed.patches.len() <= genome.patches.len()) {
-                    (*steps, *genome) = (now, changed);
-                }
-            }
-        }
-        scored.into_iter().max_by_key(|(steps, _)| *steps).map(|(_, genome)| genome).unwrap_or_default()
+        climb(known, rounds, seed, &mut |genome| self.steps(genome))
     }
 
     /// How near the worst came to the bound, percent.
@@ -185,6 +169,28 @@ impl<'a> Trial<'a> {
         }
         text
     }
+}
+
+/// The best of a few starts, each changed as long as it does not get better by it. Of a stage that nothing is known of, random pictures
+/// are the first.
+fn climb(known: &[Genome], rounds: usize, seed: u32, measure: &mut dyn FnMut(&Genome) -> u64) -> Genome {
+    let mut random = Random::seeded(seed);
+    let mut candidates: Vec<Genome> = known.to_vec();
+    candidates.extend((0..rounds / 2).map(|_| Genome::random(&mut random)));
+    let mut scored: Vec<(u64, Genome)> = candidates.into_iter().map(|genome| (measure(&genome), genome)).collect();
+    scored.sort_by_key(|(taken, _)| std::cmp::Reverse(*taken));
+    scored.truncate(3.max(known.len()));
+    for (taken, genome) in &mut scored {
+        for _ in 0..rounds / 2 {
+            let changed = genome.changed(&mut random);
+            let now = measure(&changed);
+            // As many is as good: on a plain one has to walk.
+            if now > *taken || (now == *taken && changed.patches.len() <= genome.patches.len()) {
+                (*taken, *genome) = (now, changed);
+            }
+        }
+    }
+    scored.into_iter().max_by_key(|(taken, _)| *taken).map(|(_, genome)| genome).unwrap_or_default()
 }
 
 fn percent(steps: u64, bound: u64) -> f64 {
