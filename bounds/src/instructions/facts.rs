@@ -2,6 +2,7 @@
 
 mod matching;
 
+use super::memory::library;
 use crate::work::Shape;
 
 /// Where a loop stands.
@@ -13,6 +14,8 @@ pub(super) enum At {
     Function(&'static str),
     /// A loop of a function by its number, in the order of their addresses.
     LoopOf(&'static str, usize),
+    /// Several of those.
+    LoopsOf(&'static [(&'static str, usize)]),
     /// The loop of a function whose code tells no line.
     Unwritten(&'static str),
 }
@@ -33,7 +36,7 @@ pub(super) struct Fact {
     pub(super) by: usize,
     /// Reads or writes of its line that its code has at least: those of so many steps.
     pub(super) written: usize,
-    /// Loops that take so many steps together, by a name that [`Stage::groups`] has.
+    /// Loops that take so many steps together, by a name that [`Stage::groups`] has; without, as many more as any of them may alone.
     pub(super) group: Option<&'static str>,
     /// Whether it is told of every stage, and need not be in each.
     pub(super) is_shared: bool,
@@ -67,6 +70,10 @@ impl Fact {
             At::Line(file, text) => format!("{file}: {text}"),
             At::Function(name) => name.to_owned(),
             At::LoopOf(name, nth) => format!("loop {nth} of {name}"),
+            At::LoopsOf(loops) => {
+                let places: Vec<_> = loops.iter().map(|(name, nth)| format!("loop {nth} of {name}")).collect();
+                places.join(", ")
+            }
             At::Unwritten(name) => format!("the loop without a line of {name}"),
         }
     }
@@ -133,13 +140,14 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     total("links.rs", "(bit != 0)", of("validate", "starts_and_joins")),
                     total("validate/mod.rs", "filter(|&parent| parent != label)", of("validate", "hops")),
                     each("links.rs", "for (to, from) in piece.iter_mut().zip(pixels)", width % 32),
-                    total("validate/mod.rs", "for place in 0..used {", of("validate", "places")),
+                    // Two loops, each with all places.
+                    total("validate/mod.rs", "for place in 0..used {", 2 * of("validate", "places")),
                     total("validate/mod.rs", "for (&here, above) in || renumbered.get_mut(root)", of("validate", "runs")),
                     each("validate/mod.rs", "for place in 0..if below", width),
                     total("validate/mod.rs", "while let Some(Step", of("validate", "pixels_taken_out")),
                 ],
-                // Pieces of 64 bytes, and the entries of the surfaces that go on, 8 bytes each.
-                library([32, 32], [height * width, 2 * height * width]),
+                // Pieces of 64 bytes; numbers of surfaces, 2 bytes each; entries of the surfaces that go on, 8 bytes each.
+                library([16, 16], [of("validate", "places").div_ceil(2), 2 * pixels]),
             ]
             .concat(),
             // A surface ends once.
@@ -393,37 +401,6 @@ fn fills(bytes: u64, words: u64) -> Vec<Fact> {
         is_shared: false,
     };
     vec![fact(0, bytes), fact(1, bytes / 4 + words), fact(2, bytes)]
-}
-
-/// The memory functions: each fill and copy has so many words at most, the first where it is known that they are whole words, and some have
-/// so many more together: fills, and copies.
-fn library([aligned, each]: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
-    let fact = |name, nth, each, more| {
-        let most = Most { each, more };
-        Fact { at: At::LoopOf(name, nth), most, by: 1, written: 1, group: None, is_shared: true }
-    };
-    let mut facts = Vec::new();
-    for name in ["__aeabi_memclr", "__aeabi_memset"] {
-        // Bytes to the first word, words, and bytes behind the last one.
-        facts.extend([fact(name, 0, 16, 0), fact(name, 1, each, filled), fact(name, 2, 16, 0)]);
-    }
-    let by_word = [
-        ("__aeabi_memclr4", filled),
-        ("__aeabi_memclr8", filled),
-        ("__aeabi_memset4", filled),
-        ("__aeabi_memcpy4", copied),
-    ];
-    for (name, more) in by_word {
-        facts.extend([fact(name, 0, aligned, more), fact(name, 1, 3, 0)]);
-    }
-    let name = "compiler_builtins::mem::memcpy";
-    facts.extend([
-        fact(name, 0, 16, 0),
-        fact(name, 1, each, copied),
-        fact(name, 2, 16, 0),
-        fact(name, 3, each, copied),
-    ]);
-    facts
 }
 
 /// Whether the lines of a place, the innermost first, are what is meant: one of some texts, and perhaps what the next line must have and

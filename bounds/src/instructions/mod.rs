@@ -2,6 +2,7 @@
 //! around it go round, and how often they do is known (`facts`). `docs/bounds.md` says what that proves.
 
 mod facts;
+mod memory;
 mod program;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -69,7 +70,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
     let mut program = Program::new(&functions, &begun);
     let mut used = BTreeSet::new();
     let mut together = BTreeMap::<usize, program::Sum>::new();
-    let mut groups = BTreeMap::<&str, program::Sum>::new();
+    let mut groups = BTreeMap::<&str, (program::Sum, u64)>::new();
     let mut loops = 0;
     let calls = program.calls();
     for (&at, graph) in &functions {
@@ -99,14 +100,15 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
                     "a round of the loop at {address:#x} is not {by} steps: {times} reads or writes, not {written}: {place}"
                 ));
             }
-            if let Some(group) = stage.facts[number].group {
-                let steps = rounds.iter().map(|(count, factor)| (*count, factor * by as f64));
-                groups.entry(group).or_default().extend(steps);
-            }
             let rounds = rounds.into_iter().map(|(count, factor)| (count, factor * by as f64));
             let entered = entered.into_iter().map(|(count, factor)| (count, -factor * each as f64));
             let sum: program::Sum = rounds.chain(entered).collect();
             used.insert(number);
+            if let Some(group) = stage.facts[number].group {
+                let (steps, most) = groups.entry(group).or_default();
+                steps.extend(&sum);
+                *most = more.max(*most);
+            }
             if more == 0 {
                 program.limit(sum, 0);
             } else {
@@ -122,8 +124,13 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
         }
         program.limit(sum, *most);
     }
-    for (name, most) in &stage.groups {
-        program.limit(groups.remove(name).unwrap_or_default(), *most);
+    for (name, (sum, most)) in groups {
+        let told = stage.groups.iter().find(|(group, _)| *group == name);
+        program.limit(sum, told.map_or(most, |(_, most)| *most));
+    }
+    match memory::words_behind_words(&|at| plain(image.name(at)), &functions, &calls) {
+        Ok(sum) => program.limit(sum, 0),
+        Err(why) => faults.push(why),
     }
     for (number, sum) in together {
         program.limit(sum, stage.facts[number].most.more);
@@ -253,6 +260,7 @@ impl Place {
             facts::At::Function(name) => self.function == name,
             facts::At::Unwritten(name) => self.function == name && self.lines.is_empty(),
             facts::At::LoopOf(name, nth) => self.function == name && self.nth == nth,
+            facts::At::LoopsOf(loops) => loops.contains(&(self.function.as_str(), self.nth)),
         }
     }
 }
