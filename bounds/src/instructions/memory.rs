@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    facts::{At, Fact, Most},
+    facts::{At, Fact},
     program::{Count, Sum},
 };
 use crate::image::Graph;
@@ -20,10 +20,7 @@ const WORDS_OF_MEMCPY: [usize; 2] = [1, 3];
 /// The memory functions: each fill and copy has so many words at most, the first where it is known that they are whole words, and some have
 /// so many more together: fills, and copies, whichever function does them.
 pub(super) fn library([aligned, each]: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
-    let fact = |at, each, more, group| {
-        let most = Most { each, more };
-        Fact { at, most, by: 1, written: 1, group, is_shared: true }
-    };
+    let fact = |at, each, more, group| Fact { group, is_shared: true, ..Fact::new(at, each, more) };
     let words = |loops, each, more, group| fact(At::LoopsOf(loops), each, more, Some(group));
     let fills = &[("__aeabi_memclr", 1), ("__aeabi_memset", 1)];
     let fills_of_words =
@@ -70,7 +67,7 @@ pub(super) fn words_behind_words(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::facts::Most, *};
     use crate::image::Block;
 
     fn block(next: &[usize]) -> Block {
