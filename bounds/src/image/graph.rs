@@ -132,7 +132,7 @@ impl Graph {
     }
 
     /// Blocks that can be reached from one.
-    fn reached_from(&self, from: usize) -> BTreeSet<usize> {
+    pub(crate) fn reached_from(&self, from: usize) -> BTreeSet<usize> {
         let (mut after, mut left) = (BTreeSet::new(), vec![from]);
         while let Some(at) = left.pop() {
             if after.insert(at) {

@@ -2,6 +2,7 @@
 
 mod matching;
 
+use super::memory::library;
 use crate::work::Shape;
 
 /// Where a loop stands.
@@ -15,8 +16,12 @@ pub(super) enum At {
     Function(&'static str),
     /// A loop of a function by its number, in the order of their addresses.
     LoopOf(&'static str, usize),
+    /// Several of those.
+    LoopsOf(&'static [(&'static str, usize)]),
     /// The loop of a function whose code tells no line.
     Unwritten(&'static str),
+    /// No loop, but what a line of the core writes to memory, wherever it was inlined.
+    Written(&'static str, &'static str),
 }
 
 /// How often it goes round: so often each time it is entered, and so often more for a frame. Loops that are told of the same are that
@@ -35,15 +40,29 @@ pub(super) struct Fact {
     pub(super) by: usize,
     /// Reads or writes of its line that its code has at least: those of so many steps.
     pub(super) written: usize,
-    /// Loops that take so many steps together, by a name that [`Stage::groups`] has.
+    /// Loops that take so many steps together, by a name that [`Stage::groups`] has; without, as many more as any of them may alone.
     pub(super) group: Option<&'static str>,
     /// Of these, for each step of this loop.
     pub(super) weight: u64,
+    /// How often it is entered for a frame.
+    pub(super) entered: Option<u64>,
+    /// Whether only its ways back to the head count, and not that it begins: it is left within a round.
+    pub(super) by_ways_back: bool,
     /// Whether it is told of every stage, and need not be in each.
     pub(super) is_shared: bool,
 }
 
 impl Fact {
+    pub(super) const fn new(at: At, each: u64, more: u64) -> Self {
+        let most = Most { each, more };
+        Self { at, most, by: 1, written: 1, group: None, weight: 1, entered: None, by_ways_back: false, is_shared: false }
+    }
+
+    const fn entered(mut self, times: u64) -> Self {
+        self.entered = Some(times);
+        self
+    }
+
     /// As [`Self::by`], where a round may end before all of them.
     const fn early(mut self, by: usize) -> Self {
         (self.by, self.written, self.most.each) = (by, by, by as u64);
@@ -73,10 +92,14 @@ impl Fact {
 
     pub(super) fn place(&self) -> String {
         match self.at {
-            At::Line(file, text) => format!("{file}: {text}"),
+            At::Line(file, text) | At::Written(file, text) => format!("{file}: {text}"),
             At::LineOf(name, file, text) => format!("{file}: {text} in {name}"),
             At::Function(name) => name.to_owned(),
             At::LoopOf(name, nth) => format!("loop {nth} of {name}"),
+            At::LoopsOf(loops) => {
+                let places: Vec<_> = loops.iter().map(|(name, nth)| format!("loop {nth} of {name}")).collect();
+                places.join(", ")
+            }
             At::Unwritten(name) => format!("the loop without a line of {name}"),
         }
     }
@@ -94,27 +117,11 @@ pub(super) struct Stage {
 }
 
 const fn total(file: &'static str, text: &'static str, more: u64) -> Fact {
-    Fact {
-        at: At::Line(file, text),
-        most: Most { each: 0, more },
-        by: 1,
-        written: 1,
-        group: None,
-        weight: 1,
-        is_shared: false,
-    }
+    Fact::new(At::Line(file, text), 0, more)
 }
 
 const fn each(file: &'static str, text: &'static str, each: u64) -> Fact {
-    Fact {
-        at: At::Line(file, text),
-        most: Most { each, more: 0 },
-        by: 1,
-        written: 1,
-        group: None,
-        weight: 1,
-        is_shared: false,
-    }
+    Fact::new(At::Line(file, text), each, 0)
 }
 
 pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
@@ -130,6 +137,8 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
     let cells = shape.settings.map.geometry.len() as u64;
     let surfaces = shape.surfaces;
     let limit = shape.wire_runs.min(cells);
+    // Runs that take the place of another in the list of the wire.
+    let replaced = (of("wire", "sifts") - limit - (limit - 1) - sorting(limit)) / u64::from(limit.ilog2());
     let terrain_rows = 3 * height.div_ceil(2);
     vec![
         rectify(width, 2 * height),
@@ -144,13 +153,19 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     total("links.rs", "(bit != 0)", of("validate", "starts_and_joins")),
                     total("validate/mod.rs", "filter(|&parent| parent != label)", of("validate", "hops")),
                     each("links.rs", "for (to, from) in piece.iter_mut().zip(pixels)", width % 32),
-                    total("validate/mod.rs", "for place in 0..used {", of("validate", "places")),
+                    // What stands for each, and what has ended.
+                    total("validate/mod.rs", "for place in 0..used { then let Some(parent)", of("validate", "places")),
+                    total("validate/mod.rs", "for place in 0..used { then let (table, numbers)", of("validate", "places")),
                     total("validate/mod.rs", "for (&here, above) in || renumbered.get_mut(root)", of("validate", "runs")),
                     each("validate/mod.rs", "for place in 0..if below", width),
                     total("validate/mod.rs", "while let Some(Step", of("validate", "pixels_taken_out")),
+                    // Each pixel once, wherever the walk comes to it from.
+                    written("validate/mod.rs", "*pixel = none", of("validate", "pixels_taken_out")),
+                    // How all pieces of the row above hang together is kept up to this width.
+                    written("validate/mod.rs", "None => Links::of(&pixels_above", if width <= 4096 { 0 } else { pixels }),
                 ],
-                // Pieces of 64 bytes, and the entries of the surfaces that go on, 8 bytes each.
-                library([32, 32], [height * width, 2 * height * width]),
+                // Pieces of 64 bytes; numbers of surfaces, 2 bytes each; entries of the surfaces that go on, 8 bytes each.
+                library([16, 16], [of("validate", "places").div_ceil(2), 2 * pixels]),
             ]
             .concat(),
             // A surface ends once.
@@ -215,10 +230,12 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                 vec![
                     total("wire/select.rs", "for (row, a) in", cells / u64::from(shape.settings.map.geometry.y_count)),
                     total("wire/select.rs", "for (b, cell) in", of("wire", "cells")),
-                    // Once more each than it exchanges: as often as runs are sorted, come into the heap, and become one.
+                    // Exchanges: below the root for each run that is sorted, when the list becomes a heap, and below each run that
+                    // another takes the place of.
                     sifts("loop { <- sift_down(rest, 0)", sorting(limit)),
                     sifts("loop { <- sift_down(heap, parent)", limit),
-                    sifts("loop { || heap.swap(a, b) <- sift_down(heap, 0)", of("wire", "sifts") - sorting(limit) - limit),
+                    sifts("loop { || heap.swap(a, b) <- sift_down(heap, 0)", replaced * u64::from(limit.ilog2()))
+                        .entered(replaced),
                     each("wire/select.rs", "for len in (1..heap.len())", shape.wire_runs),
                     each("wire/select.rs", "for parent in (0..heap.len() / 2)", shape.wire_runs / 2),
                     each("wire/select.rs", "runs.iter().fold(0u32", shape.wire_runs),
@@ -356,22 +373,21 @@ fn rectify(width: u64, rows: u64) -> Stage {
     }
 }
 
-/// A loop that goes down the heap of the wire.
+/// A loop that goes down the heap of the wire: it goes on with each exchange.
 const fn sifts(text: &'static str, more: u64) -> Fact {
-    Fact {
-        at: At::Line("wire/select.rs", text),
-        most: Most { each: 1, more },
-        by: 1,
-        written: 1,
-        group: None,
-        weight: 1,
-        is_shared: false,
-    }
+    let mut fact = Fact::new(At::Line("wire/select.rs", text), 0, more);
+    fact.by_ways_back = true;
+    fact
 }
 
-/// Exchanges of a heap of so many when it is sorted.
+/// What a line writes.
+const fn written(file: &'static str, text: &'static str, more: u64) -> Fact {
+    Fact::new(At::Written(file, text), 0, more)
+}
+
+/// Exchanges below the root of a heap of so many when it is sorted.
 fn sorting(limit: u64) -> u64 {
-    (1..limit).map(|left| 1 + u64::from(left.ilog2())).sum()
+    (1..limit).map(|left| u64::from(left.ilog2())).sum()
 }
 
 /// Sines and cosines of angles of less than two turns: nothing is done about larger ones. Exponents have no more bits to be found
@@ -402,79 +418,23 @@ fn regions(shape: &Shape, times: u64, of: &dyn Fn(&str, &str) -> u64) -> Vec<Fac
 
 /// The loop of a function that no line leads back to the head of.
 const fn unwritten(name: &'static str, more: u64) -> Fact {
-    Fact {
-        at: At::Unwritten(name),
-        most: Most { each: 0, more },
-        by: 1,
-        written: 1,
-        group: None,
-        weight: 1,
-        is_shared: false,
-    }
+    Fact::new(At::Unwritten(name), 0, more)
 }
 
-/// A line of the core in one function.
-const fn line_of(name: &'static str, file: &'static str, text: &'static str, more: u64) -> Fact {
-    let mut fact = total(file, text, more);
-    fact.at = At::LineOf(name, file, text);
-    fact
+/// The first loop of a function, around all others.
+const fn outermost(name: &'static str, more: u64) -> Fact {
+    Fact::new(At::LoopOf(name, 0), 0, more)
 }
 
 const fn function(name: &'static str, each: u64, more: u64) -> Fact {
-    Fact {
-        at: At::Function(name),
-        most: Most { each, more },
-        by: 1,
-        written: 1,
-        group: None,
-        weight: 1,
-        is_shared: false,
-    }
+    Fact::new(At::Function(name), each, more)
+            At::LineOf(name, file, text) => format!("{file}: {text} in {name}"),
 }
 
 /// Fills of `bytes` in all, and of `words` beside.
 fn fills(bytes: u64, words: u64) -> Vec<Fact> {
-    let fact = |nth, more| Fact {
-        at: At::LoopOf("__aeabi_memset", nth),
-        most: Most { each: 0, more },
-        by: 1,
-        written: 1,
-        group: None,
-        weight: 1,
-        is_shared: false,
-    };
+    let fact = |nth, more| Fact::new(At::LoopOf("__aeabi_memset", nth), 0, more);
     vec![fact(0, bytes), fact(1, bytes / 4 + words), fact(2, bytes)]
-}
-
-/// The memory functions: each fill and copy has so many words at most, the first where it is known that they are whole words, and some have
-/// so many more together: fills, and copies.
-fn library([aligned, each]: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
-    let fact = |name, nth, each, more| {
-        let most = Most { each, more };
-        Fact { at: At::LoopOf(name, nth), most, by: 1, written: 1, group: None, weight: 1, is_shared: true }
-    };
-    let mut facts = Vec::new();
-    for name in ["__aeabi_memclr", "__aeabi_memset"] {
-        // Bytes to the first word, words, and bytes behind the last one.
-        facts.extend([fact(name, 0, 16, 0), fact(name, 1, each, filled), fact(name, 2, 16, 0)]);
-    }
-    let by_word = [
-        ("__aeabi_memclr4", filled),
-        ("__aeabi_memclr8", filled),
-        ("__aeabi_memset4", filled),
-        ("__aeabi_memcpy4", copied),
-    ];
-    for (name, more) in by_word {
-        facts.extend([fact(name, 0, aligned, more), fact(name, 1, 3, 0)]);
-    }
-    let name = "compiler_builtins::mem::memcpy";
-    facts.extend([
-        fact(name, 0, 16, 0),
-        fact(name, 1, each, copied),
-        fact(name, 2, 16, 0),
-        fact(name, 3, each, copied),
-    ]);
-    facts
 }
 
 /// Whether the lines of a place, the innermost first, are what is meant: one of some texts, and perhaps what the next line must have and

@@ -2,7 +2,9 @@
 //! around it go round, and how often they do is known (`facts`). `docs/bounds.md` says what that proves.
 
 mod facts;
+mod memory;
 mod program;
+mod written;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -69,7 +71,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
     let mut program = Program::new(&functions, &begun);
     let mut used = BTreeSet::new();
     let mut together = BTreeMap::<usize, program::Sum>::new();
-    let mut groups = BTreeMap::<&str, program::Sum>::new();
+    let mut groups = BTreeMap::<&str, (program::Sum, u64)>::new();
     let mut loops = 0;
     let calls = program.calls();
     for (&at, graph) in &functions {
@@ -89,8 +91,12 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
             let is_inner = known
                 .iter()
                 .any(|&(other, outer)| other == number && outer.head != one.head && outer.blocks.contains(&one.head));
-            let (rounds, entered) = rounds(at, graph, one, is_inner, calls.get(&at).map_or(&[], Vec::as_slice));
-            let Fact { most: Most { each, more }, by, written, weight, .. } = stage.facts[number];
+            let Fact { most: Most { each, more }, by, written, weight, by_ways_back, .. } = stage.facts[number];
+            let calls = calls.get(&at).map_or(&[][..], Vec::as_slice);
+            let (rounds, entered) = rounds(at, graph, one, is_inner || by_ways_back, calls);
+            if let Some(most) = stage.facts[number].entered {
+                program.limit(entered.clone(), most);
+            }
             let times = times_written(image, graph, &found, one, &stage.facts[number]);
             if times < written {
                 let address = graph.blocks[one.head].instructions[0];
@@ -99,20 +105,30 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
                     "a round of the loop at {address:#x} is not {by} steps: {times} reads or writes, not {written}: {place}"
                 ));
             }
-            if let Some(group) = stage.facts[number].group {
-                let weight = (by as u64 * weight) as f64;
-                let steps = rounds.iter().map(|(count, factor)| (*count, factor * weight));
-                groups.entry(group).or_default().extend(steps);
-            }
             let rounds = rounds.into_iter().map(|(count, factor)| (count, factor * by as f64));
             let entered = entered.into_iter().map(|(count, factor)| (count, -factor * each as f64));
             let sum: program::Sum = rounds.chain(entered).collect();
             used.insert(number);
+            if let Some(group) = stage.facts[number].group {
+                let (steps, most) = groups.entry(group).or_default();
+                steps.extend(sum.iter().map(|(count, factor)| (*count, factor * weight as f64)));
+                *most = more.max(*most);
+            }
             if more == 0 {
                 program.limit(sum, 0);
             } else {
                 together.entry(number).or_default().extend(sum);
             }
+        }
+    }
+    for (number, fact) in stage.facts.iter().enumerate() {
+        let facts::At::Written(file, text) = fact.at else { continue };
+        match written::times(image, &functions, &|chain| chain.is(file, text)) {
+            Ok(sum) => {
+                used.extend((!sum.is_empty()).then_some(number));
+                program.limit(sum, fact.most.more);
+            }
+            Err(why) => faults.push(format!("{why}: {}", fact.place())),
         }
     }
     for (name, most) in &stage.calls {
@@ -123,8 +139,13 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
         }
         program.limit(sum, *most);
     }
-    for (name, most) in &stage.groups {
-        program.limit(groups.remove(name).unwrap_or_default(), *most);
+    for (name, (sum, most)) in groups {
+        let told = stage.groups.iter().find(|(group, _)| *group == name);
+        program.limit(sum, told.map_or(most, |(_, most)| *most));
+    }
+    match memory::words_behind_words(&|at| plain(image.name(at)), &functions, &calls) {
+        Ok(sum) => program.limit(sum, 0),
+        Err(why) => faults.push(why),
     }
     for (number, sum) in together {
         program.limit(sum, stage.facts[number].most.more);
@@ -167,9 +188,7 @@ fn times_written(image: &Image, graph: &Graph, all: &[Loop], one: &Loop, fact: &
         for &address in &graph.blocks[block].instructions {
             let Some(mnemonic) = image.memory_mnemonic(address) else { continue };
             let lines = Chain::of(image, address);
-            // Wherever it was inlined from: what is written at the line may be a call.
-            let is_line = (0..lines.0.len()).any(|from| Chain(lines.0[from..].to_vec()).is(file, text));
-            if is_line {
+            if lines.is_within(&|chain| chain.is(file, text)) {
                 *times.entry(mnemonic.contains("ld")).or_default() += 1;
             }
         }
@@ -196,6 +215,13 @@ impl Chain {
     fn is(&self, file: &str, meant: &str) -> bool {
         let lines: Vec<_> = self.0.iter().map(|(_, _, text, next)| (text.clone(), next.clone())).collect();
         self.0.first().is_some_and(|(of, ..)| of == file) && facts::is_meant(meant, &lines)
+    }
+}
+
+impl Chain {
+    /// Whether it or one that it was inlined into is such a one: what is written at a line may be a call.
+    fn is_within(&self, is: &dyn Fn(&Chain) -> bool) -> bool {
+        (0..self.0.len()).any(|from| is(&Chain(self.0[from..].to_vec())))
     }
 }
 
@@ -256,7 +282,9 @@ impl Place {
             }
             facts::At::Function(name) => self.function == name,
             facts::At::Unwritten(name) => self.function == name && self.lines.is_empty(),
+            facts::At::Written(..) => false,
             facts::At::LoopOf(name, nth) => self.function == name && self.nth == nth,
+            facts::At::LoopsOf(loops) => loops.contains(&(self.function.as_str(), self.nth)),
         }
     }
 }

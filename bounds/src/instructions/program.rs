@@ -140,11 +140,11 @@ impl Same {
     }
 }
 
-/// How often a loop goes round, and how often it is entered.
-pub(super) fn rounds(at: u32, graph: &Graph, one: &Loop, is_inner: bool, calls: &[Count]) -> (Sum, Sum) {
+/// How often a loop goes round, and how often it is entered. By its ways back, the round that leaves it is none.
+pub(super) fn rounds(at: u32, graph: &Graph, one: &Loop, by_ways_back: bool, calls: &[Count]) -> (Sum, Sum) {
     let leaves =
         |from: &usize| graph.blocks[*from].ends || graph.blocks[*from].next.iter().any(|to| !one.blocks.contains(to));
-    let is_tested_at_end = !is_inner && one.backs.iter().all(leaves);
+    let is_tested_at_end = !by_ways_back && one.backs.iter().all(leaves);
     // Beside its head as well, where the code has it so.
     let before = graph.before();
     let mut entered: Sum = one
@@ -207,6 +207,17 @@ mod tests {
         assert_eq!(limited(4, None), (10 * (10 + 14), [10, 0, 10, 10, 10, 40, 10]));
         // Six of ten take the other way.
         assert_eq!(limited(4, Some(4)), (4 * (10 + 14) + 6 * 8, [10, 6, 4, 10, 4, 16, 4]));
+    }
+
+    #[test]
+    fn a_loop_by_its_ways_back_has_a_round_more_than_it_goes_back() {
+        let (functions, begun) = (functions(), BTreeMap::from([(100, 10)]));
+        let found = functions[&100].loops();
+        let (rounds, entered) = rounds(100, &functions[&100], &found[0], true, &[]);
+        assert_eq!((&rounds, &entered), (&vec![(Count::Way(100, 1, 1), 1.0)], &vec![(Count::Way(100, 0, 1), 1.0)]));
+        let mut program = Program::new(&functions, &begun);
+        program.limit(rounds, 7);
+        assert_eq!(program.most().unwrap().0, 10 * (1 + 3 + 1) + 7 * 3);
     }
 
     #[test]
