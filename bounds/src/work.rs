@@ -139,9 +139,9 @@ impl Shape {
         let narrow = width - 2 * margin_x;
         let wide_width = u64::from(settings.wide_window_width);
         let wide = self.wide();
-        let begun = wide_width * (SHORT_GAPS + 1 + wide / (wide_width + 1));
-        let runs = SHORT_GAPS + 1 + wide / (wide_width + 1);
-        let decided = CHUNK * (narrow.div_ceil(CHUNK) + wide.div_ceil(CHUNK) + runs);
+        let [wide_runs, wide_parts] = self.wide_runs();
+        let begun = wide_width * wide_runs;
+        let decided = CHUNK * (narrow.div_ceil(CHUNK) + wide_parts);
         let begun_narrow = u64::from(settings.window_width);
         vec![
             ("filtered_pixels", 3 * width * filtered),
@@ -158,6 +158,21 @@ impl Shape {
     /// Pixels of a row that have a wide window within it.
     fn wide(&self) -> u64 {
         self.width.saturating_sub(2 * (u64::from(self.settings.matching.wide_window_width) / 2 + REACH))
+    }
+
+    /// Runs of weak pixels that a row has at most, which the wide window starts anew at, and parts of [`CHUNK`] pixels that they have.
+    pub fn wide_runs(&self) -> [u64; 2] {
+        let width = u64::from(self.settings.matching.wide_window_width);
+        let short = width / 2 / 3 + 1;
+        let (mut most, mut parts) = (0, 0);
+        for runs in 1..=self.wide() {
+            let gaps = runs - 1;
+            let apart = short * gaps.min(SHORT_GAPS) + width * gaps.saturating_sub(SHORT_GAPS);
+            // Each has a pixel at least, and those beyond that fill parts one after the other.
+            let Some(left) = self.wide().checked_sub(apart + runs) else { break };
+            (most, parts) = (runs, parts.max(runs + left / CHUNK));
+        }
+        [most, parts]
     }
 
     /// Columns that are summed for a row where a window starts, and pixels that the wide window goes on by.
@@ -367,6 +382,25 @@ mod tests {
                 assert!(stage.loops.iter().all(|(_, steps)| *steps <= stage.total), "{stage:?}");
             }
         }
+    }
+
+    #[test]
+    fn runs_of_weak_pixels_are_as_many_as_find_room() {
+        let shape = Shape::of(320, 240, 48);
+        let width = usize::from(shape.settings.matching.wide_window_width);
+        let (radius, wide) = (width / 2, shape.wide() as usize);
+        // Runs of equal length, as near to each other as they may be: as the core goes along a row.
+        let count = |length: usize| {
+            let (mut at, mut runs, mut parts) = (0, 0, 0);
+            while at < wide {
+                let end = (at + length).min(wide);
+                (runs, parts) = (runs + 1, parts + (end - at).div_ceil(64));
+                at = end + 1 + if runs <= 4 { radius / 3 } else { 2 * radius };
+            }
+            [runs, parts]
+        };
+        let seen = (1..=wide).map(count).fold([0, 0], |most, seen| [most[0].max(seen[0]), most[1].max(seen[1])]);
+        assert_eq!(shape.wide_runs(), seen.map(|count| count as u64));
     }
 
     #[test]

@@ -55,7 +55,17 @@ pub(super) struct Fact {
 impl Fact {
     pub(super) const fn new(at: At, each: u64, more: u64) -> Self {
         let most = Most { each, more };
-        Self { at, most, by: 1, written: 1, group: None, weight: 1, entered: None, by_ways_back: false, is_shared: false }
+        Self {
+            at,
+            most,
+            by: 1,
+            written: 1,
+            group: None,
+            weight: 1,
+            entered: None,
+            by_ways_back: false,
+            is_shared: false,
+        }
     }
 
     const fn entered(mut self, times: u64) -> Self {
@@ -118,6 +128,11 @@ pub(super) struct Stage {
 
 const fn total(file: &'static str, text: &'static str, more: u64) -> Fact {
     Fact::new(At::Line(file, text), 0, more)
+}
+
+/// A line of the core in one function.
+const fn line_of(name: &'static str, file: &'static str, text: &'static str, more: u64) -> Fact {
+    Fact::new(At::LineOf(name, file, text), 0, more)
 }
 
 const fn each(file: &'static str, text: &'static str, each: u64) -> Fact {
@@ -421,14 +436,8 @@ const fn unwritten(name: &'static str, more: u64) -> Fact {
     Fact::new(At::Unwritten(name), 0, more)
 }
 
-/// The first loop of a function, around all others.
-const fn outermost(name: &'static str, more: u64) -> Fact {
-    Fact::new(At::LoopOf(name, 0), 0, more)
-}
-
 const fn function(name: &'static str, each: u64, more: u64) -> Fact {
     Fact::new(At::Function(name), each, more)
-            At::LineOf(name, file, text) => format!("{file}: {text} in {name}"),
 }
 
 /// Fills of `bytes` in all, and of `words` beside.

@@ -37,9 +37,8 @@ fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushe
     let rows = pictures * (shape.height - 2 * margin) + strips;
     let blocks = disparities.div_ceil(8);
     let starts = of("costs_begun_afresh") / disparities;
-    // Chunks of a row that is gone through as a whole: what comes on top of them begins afresh.
+    // Chunks of a row that is gone through as a whole.
     let narrow_chunks = rows * (narrow / rows).div_ceil(64);
-    let wide_chunks = narrow_chunks + rows * (wide / rows).div_ceil(64);
     let edges = Edges::of(disparities);
     // Of each row that both windows go along.
     let on_edges = |of_a_row: u64| 2 * rows * of_a_row;
@@ -126,7 +125,8 @@ fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushe
                 total("arch/thumb/search.rs", "asm!( <- self.key_blocks(", narrow * blocks).of("blocks"),
                 total("arch/thumb/search.rs", "asm!( <- self.cost_blocks(", wide * blocks).of("wide blocks"),
                 total("arch/thumb/search.rs", "asm!( <- self.least()", (narrow + wide) * blocks),
-                total("arch/thumb/search.rs", "asm!( <- self.next_below(", (narrow + wide) * (blocks + 4)),
+                // Of each block once: it goes on behind the one that was found.
+                total("arch/thumb/search.rs", "asm!( <- self.next_below(", (narrow + wide) * blocks),
                 each("arch/thumb/search.rs", ">= AMBIGUOUS", 4),
                 total("arch/thumb/search.rs", "places.fold(0u32, |near", on_edges(edges.partly)).by(4),
                 total("arch/thumb/search.rs", "for block in 0..first <- costs.go_on::<true>", rows * edges.blocks)
@@ -150,7 +150,7 @@ fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushe
             ("fencepost_core::arch::plain::search_costs", 0),
             ("fencepost_core::arch::thumb::search::search_keys", narrow_chunks),
             ("fencepost_core::arch::thumb::search::search_costs", chunks - narrow_chunks),
-            ("fencepost_core::arch::thumb::search::Costs::begin", chunks - wide_chunks + rows),
+            ("fencepost_core::arch::thumb::search::Costs::begin", rows * (1 + shape.wide_runs()[0])),
             ("fencepost_core::arch::thumb::search::Costs::below_at_edge", on_edges(edges.parts)),
         ],
         groups: vec![
