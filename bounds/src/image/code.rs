@@ -118,6 +118,19 @@ impl Code {
     }
 }
 
+/// The number that argument `nth` of the only call in a piece of code is: what last goes into its register, if that is a number.
+pub(crate) fn argument(code: &[&Instruction], nth: u16) -> Option<u32> {
+    let register = ArmReg::ARM_REG_R0 as u16 + nth;
+    let is_call = |one: &&Instruction| matches!(one.mnemonic.as_str(), "bl" | "b" | "b.w");
+    let before = &code[..code.iter().rposition(|one| is_call(one))?];
+    // Whatever else names the register may write it.
+    let names = |one: &&&Instruction| (0..one.operands.len()).any(|i| one.register(i) == Some(register));
+    let last = before.iter().rev().find(names)?;
+    let is_move = ["mov", "movs", "mov.w", "movw"].contains(&last.mnemonic.as_str());
+    let number = last.immediate(1).filter(|_| is_move && !last.is_conditional() && last.register(0) == Some(register));
+    u32::try_from(number?).ok()
+}
+
 fn disassemble(
     engine: &Capstone,
     code: &[u8],

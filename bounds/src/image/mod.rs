@@ -123,6 +123,12 @@ impl Image {
         is_memory.then_some(instruction.mnemonic.as_str())
     }
 
+    /// The number that argument `nth` of the only call of a block is, where the code of the block says so.
+    pub(crate) fn argument(&self, block: &[u32], nth: u16) -> Option<u32> {
+        let code: Option<Vec<_>> = block.iter().map(|address| self.code.at(*address)).collect();
+        code::argument(&code?, nth)
+    }
+
     /// The address of a function, by its name.
     pub(crate) fn address(&self, name: &str) -> Option<u32> {
         self.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)

@@ -65,6 +65,25 @@ pub(super) fn words_behind_words(
     Ok(words.chain(called.map(|call| (*call, -1.0))).collect())
 }
 
+/// Words that copies, or fills, go through for their calls: those that the code of a call says, or as many as `most` says of one.
+pub(super) fn words_of_calls(
+    (name, length): (&dyn Fn(u32) -> String, &dyn Fn(Count, u16) -> Option<u32>),
+    calls: &BTreeMap<u32, Vec<Count>>,
+    is_copied: bool,
+    most: u64,
+) -> Sum {
+    let is_library =
+        |at: u32| ["__aeabi_mem", "compiler_builtins::mem::"].iter().any(|prefix| name(at).starts_with(prefix));
+    let from = |call: &Count| match *call {
+        Count::Block(at, _) | Count::Way(at, _, _) => at,
+    };
+    let of_kind = calls.iter().filter(|(at, _)| is_library(**at) && name(**at).contains("memcpy") == is_copied);
+    let outer = of_kind.flat_map(|(_, calls)| calls).filter(|call| !is_library(from(call)));
+    // (to, from, length), and (to, length) or (to, length, value): run-time ABI for the Arm architecture, section 4.3.4.
+    let words = |call| length(call, if is_copied { 2 } else { 1 }).map_or(most, |bytes| u64::from(bytes / 4));
+    outer.map(|call| (*call, words(*call) as f64)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::{super::facts::Most, *};
@@ -94,6 +113,18 @@ mod tests {
         let mut blocks = loops.to_vec();
         blocks[0] = block(&[1]);
         assert!(called(blocks).unwrap_err().contains("no way of their own from 0x64"));
+    }
+
+    #[test]
+    fn a_call_takes_the_words_that_its_code_says() {
+        let name = |at: u32| ["__aeabi_memclr4", MEMCPY, "__aeabi_memcpy", "core"][at as usize / 10].to_owned();
+        let length = |call, nth| (call == Count::Block(30, nth.into())).then_some(70);
+        let [cleared, copied, unknown, wrapped] =
+            [(30, 1), (30, 2), (30, 3), (20, 0)].map(|(at, place)| Count::Block(at, place));
+        let calls = BTreeMap::from([(0, vec![cleared]), (10, vec![wrapped, copied]), (20, vec![unknown])]);
+        let of = |is_copied| words_of_calls((&name, &length), &calls, is_copied, 32);
+        assert_eq!(of(true), [(copied, 17.0), (unknown, 32.0)]);
+        assert_eq!(of(false), [(cleared, 17.0)]);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::{
     work::Shape,
 };
 use facts::{Fact, Most, Stage};
-use program::{Program, Times, rounds};
+use program::{Count, Program, Times, rounds};
 
 /// Width, height and disparities of the images whose machine code is looked at.
 pub(crate) const SIZE: (usize, usize, usize) = (320, 240, 48);
@@ -72,6 +72,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
     let mut used = BTreeSet::new();
     let mut together = BTreeMap::<usize, program::Sum>::new();
     let mut groups = BTreeMap::<&str, (program::Sum, u64)>::new();
+    let mut by_words = BTreeMap::<&str, (program::Sum, u64, u64)>::new();
     let mut loops = 0;
     let calls = program.calls();
     for (&at, graph) in &functions {
@@ -104,6 +105,11 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
                 faults.push(format!(
                     "a round of the loop at {address:#x} is not {by} steps: {times} reads or writes, not {written}: {place}"
                 ));
+            }
+            if let Some(group @ ("filled" | "copied")) = stage.facts[number].group {
+                let (steps, words, beside) = by_words.entry(group).or_default();
+                steps.extend(&rounds);
+                (*words, *beside) = (each.max(*words), more.max(*beside));
             }
             let rounds = rounds.into_iter().map(|(count, factor)| (count, factor * by as f64));
             let entered = entered.into_iter().map(|(count, factor)| (count, -factor * each as f64));
@@ -143,7 +149,20 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
         let told = stage.groups.iter().find(|(group, _)| *group == name);
         program.limit(sum, told.map_or(most, |(_, most)| *most));
     }
-    match memory::words_behind_words(&|at| plain(image.name(at)), &functions, &calls) {
+    let name = |at| plain(image.name(at));
+    let length = |call, nth| match call {
+        Count::Block(at, place) => {
+            let block = &functions[&at].blocks[place];
+            image.argument(&block.instructions, nth).filter(|_| block.calls.len() == 1)
+        }
+        Count::Way(..) => None,
+    };
+    for (group, (mut sum, most, beside)) in by_words {
+        let words = memory::words_of_calls((&name, &length), &calls, group == "copied", most);
+        sum.extend(words.into_iter().map(|(call, words)| (call, -words)));
+        program.limit(sum, beside);
+    }
+    match memory::words_behind_words(&name, &functions, &calls) {
         Ok(sum) => program.limit(sum, 0),
         Err(why) => faults.push(why),
     }
