@@ -1,5 +1,6 @@
 //! How often the loops of the machine code go round.
 
+mod health;
 mod matching;
 
 use super::memory::library;
@@ -52,6 +53,11 @@ impl Fact {
     pub(super) const fn new(at: At, each: u64, more: u64) -> Self {
         let most = Most { each, more };
         Self { at, most, by: 1, written: 1, group: None, entered: None, by_ways_back: false, is_shared: false }
+    }
+
+    const fn by_ways_back(mut self) -> Self {
+        self.by_ways_back = true;
+        self
     }
 
     const fn entered(mut self, times: u64) -> Self {
@@ -114,12 +120,17 @@ const fn each(file: &'static str, text: &'static str, each: u64) -> Fact {
     Fact::new(At::Line(file, text), each, 0)
 }
 
-pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
+/// The most steps of a loop of a stage, by their names.
+fn looked_up(shape: &Shape) -> impl Fn(&str, &str) -> u64 + use<> {
     let works = shape.stages();
-    let of = |stage: &str, name: &str| -> u64 {
+    move |stage, name| {
         let work = works.iter().find(|work| work.stage == stage).expect("a stage");
         work.loops.iter().find(|(other, _)| *other == name).expect("a loop").1
-    };
+    }
+}
+
+pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
+    let of = looked_up(shape);
     let (width, height) = (shape.width, shape.height);
     let pixels = width * height;
     let rows = 2 * (height + shape.exchanged_rows());
@@ -355,14 +366,13 @@ Stage {
             groups: vec![],
         },
         matching::stage(shape, &of),
+        health::stage(shape, &of),
     ]
 }
 
 /// A loop that goes down the heap of the wire: it goes on with each exchange.
 const fn sifts(text: &'static str, more: u64) -> Fact {
-    let mut fact = Fact::new(At::Line("wire/select.rs", text), 0, more);
-    fact.by_ways_back = true;
-    fact
+    total("wire/select.rs", text, more).by_ways_back()
 }
 
 /// What a line writes.

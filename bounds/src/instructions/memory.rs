@@ -19,26 +19,42 @@ const WORDS_OF_MEMCPY: [usize; 2] = [1, 3];
 
 /// The memory functions: each fill and copy has so many words at most, the first where it is known that they are whole words, and some have
 /// so many more together: fills, and copies, whichever function does them.
-pub(super) fn library([aligned, each]: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
-    let fact = |at, each, more, group| Fact { group, is_shared: true, ..Fact::new(at, each, more) };
-    let words = |loops, each, more, group| fact(At::LoopsOf(loops), each, more, Some(group));
-    let fills = &[("__aeabi_memclr", 1), ("__aeabi_memset", 1)];
-    let fills_of_words =
-        &[("__aeabi_memclr4", 0), ("__aeabi_memclr8", 0), ("__aeabi_memset4", 0), ("__aeabi_memset8", 0)];
-    let copies = const { &[(MEMCPY, WORDS_OF_MEMCPY[0]), (MEMCPY, WORDS_OF_MEMCPY[1])] };
-    let copies_of_words = const { &[(MEMCPY_OF_WORDS[0], 0), (MEMCPY_OF_WORDS[1], 0)] };
+pub(super) fn library(each: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
+    [fills(each, filled), copies(each, copied)].concat()
+}
+
+/// The fills alone.
+pub(super) fn fills([aligned, each]: [u64; 2], more: u64) -> Vec<Fact> {
+    let by_word = &[("__aeabi_memclr4", 0), ("__aeabi_memclr8", 0), ("__aeabi_memset4", 0), ("__aeabi_memset8", 0)];
     let mut facts = vec![
-        words(fills, each, filled, "filled"),
-        words(fills_of_words, aligned, filled, "filled"),
-        words(copies, each, copied, "copied"),
-        words(copies_of_words, aligned, copied, "copied"),
+        words(&[("__aeabi_memclr", 1), ("__aeabi_memset", 1)], each, more, "filled"),
+        words(by_word, aligned, more, "filled"),
     ];
-    // Bytes to the first word, and behind the last one; fewer than 16 have no words.
-    for name in ["__aeabi_memclr", "__aeabi_memset", MEMCPY] {
-        facts.extend([(0, 3), (2, 15)].map(|(nth, bytes)| fact(At::LoopOf(name, nth), bytes, 0, None)));
-    }
-    facts.extend(fills_of_words.map(|(name, _)| fact(At::LoopOf(name, 1), 3, 0, None)));
+    facts.extend(["__aeabi_memclr", "__aeabi_memset"].map(bytes).concat());
+    facts.extend(by_word.map(|(name, _)| shared(At::LoopOf(name, 1), 3, 0)));
     facts
+}
+
+/// The copies alone.
+pub(super) fn copies([aligned, each]: [u64; 2], more: u64) -> Vec<Fact> {
+    let any = const { &[(MEMCPY, WORDS_OF_MEMCPY[0]), (MEMCPY, WORDS_OF_MEMCPY[1])] };
+    let by_word = const { &[(MEMCPY_OF_WORDS[0], 0), (MEMCPY_OF_WORDS[1], 0)] };
+    let mut facts = vec![words(any, each, more, "copied"), words(by_word, aligned, more, "copied")];
+    facts.extend(bytes(MEMCPY));
+    facts
+}
+
+/// Bytes to the first word, and behind the last one; fewer than 16 have no words.
+fn bytes(name: &'static str) -> Vec<Fact> {
+    [(0, 3), (2, 15)].map(|(nth, bytes)| shared(At::LoopOf(name, nth), bytes, 0)).to_vec()
+}
+
+fn words(loops: &'static [(&'static str, usize)], each: u64, more: u64, group: &'static str) -> Fact {
+    Fact { group: Some(group), ..shared(At::LoopsOf(loops), each, more) }
+}
+
+const fn shared(at: At, each: u64, more: u64) -> Fact {
+    Fact { is_shared: true, ..Fact::new(at, each, more) }
 }
 
 /// How often copies come to words more often than they are called for them: a copy of whole words leaves less than a word to them.
