@@ -26,6 +26,8 @@ pub struct Shape {
     pub wire_runs: u64,
     /// Frames of a scan.
     pub wire_frames: u64,
+    /// Rows that are matched the other way round, if hardly anything matches.
+    pub exchanged: u64,
 }
 
 /// The bound of a stage: its loops, and what all of them can take together. That may be less than the sum, as not all can take the
@@ -80,6 +82,7 @@ impl Shape {
             settings,
             wire_runs: wire.max_runs() as u64,
             wire_frames: fencepost_core::wire::max_frames_per_scan(&wire) as u64,
+            exchanged: EXCHANGED,
         }
     }
 
@@ -98,7 +101,7 @@ impl Shape {
 
     /// Rows that go into the matcher, beside those of the picture, to be matched the other way round.
     pub fn exchanged_rows(&self) -> u64 {
-        EXCHANGED * (2 * self.margins()[1] + 1)
+        self.exchanged * (2 * self.margins()[1] + 1)
     }
 
     /// All stages, in the order of the data.
@@ -126,11 +129,11 @@ impl Shape {
         let Self { width, height, disparities, .. } = *self;
         let settings = &self.settings.matching;
         let [margin_x, margin_y] = self.margins();
-        let filtered = (height - 2 * REACH) + EXCHANGED * (2 * margin_y + 1 - 2 * REACH);
+        let filtered = (height - 2 * REACH) + self.exchanged * (2 * margin_y + 1 - 2 * REACH);
         let window_rows = u64::from(settings.window_height);
         let slid = (2 * (height - 2 * REACH)).saturating_sub(window_rows)
-            + EXCHANGED * (2 * (2 * margin_y + 1 - 2 * REACH) - window_rows);
-        let rows = height - 2 * margin_y + EXCHANGED;
+            + self.exchanged * (2 * (2 * margin_y + 1 - 2 * REACH) - window_rows);
+        let rows = height - 2 * margin_y + self.exchanged;
         let narrow = width - 2 * margin_x;
         let wide_width = u64::from(settings.wide_window_width);
         let wide = width.saturating_sub(2 * (wide_width / 2 + REACH));
@@ -275,7 +278,7 @@ impl Shape {
                 "pixels",
                 2 * width.div_ceil(4) * height.div_ceil(4)
                     + (width * height).div_ceil(2)
-                    + EXCHANGED * width
+                    + self.exchanged * width
                     + geometry.len() as u64,
             ),
         ];

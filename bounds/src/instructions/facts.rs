@@ -133,7 +133,9 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
     let of = looked_up(shape);
     let (width, height) = (shape.width, shape.height);
     let pixels = width * height;
-    let rows = 2 * (height + shape.exchanged_rows());
+    // What is matched the other way round is the health's.
+    let as_given = Shape { exchanged: 0, ..*shape };
+    let rows = 2 * height;
     let rows_of_tiles = height * width.div_ceil(32);
     let (tiles_down, tiles) = (height.div_ceil(32), height.div_ceil(32) * width.div_ceil(32));
     let cells = shape.settings.map.geometry.len() as u64;
@@ -365,7 +367,7 @@ Stage {
             ],
             groups: vec![],
         },
-        matching::stage(shape, &of),
+        matching::stage(&as_given, &looked_up(&as_given)),
         health::stage(shape, &of),
     ]
 }

@@ -25,8 +25,6 @@ const BANDS: u64 = 256;
 const AROUND: u64 = 9;
 const OUT_OF_LINE: u64 = 17;
 const REMEMBERED: u64 = 5;
-/// Strips that are matched the other way round.
-const EXCHANGED: u64 = 8;
 
 /// The looks at the rows, and the judgement with the strips that are matched the other way round.
 pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
@@ -36,7 +34,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
     let strips = Shape { height: 2 * margin, ..*shape };
     let matching = matching::stage(&strips, &looked_up(&strips));
     // The sums of all columns of each strip, and the tables of both pictures.
-    let filled = (EXCHANGED + 1) * (width * shape.disparities / 2 + width)
+    let filled = (shape.exchanged + 1) * (width * shape.disparities / 2 + width)
         + 2 * (width / 2 + TILES[0] * TILES[1] * 3 / 2 + 2 * BANDS);
     // The rows of the strips, and the detection's place.
     let copied = 2 * shape.exchanged_rows() * (width / 4) + 64;
@@ -47,7 +45,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
             rows(width, height),
             sparse(of("health", "places_for_contrast").div_ceil(LANES), of("health", "patches_compared") / LANES),
             judged(shape),
-            exchanged(width, shape.exchanged_rows()),
+            exchanged(shape),
             fills([width / 4; 2], filled),
             copies([WINDOW / 4; 2], copied),
             matching.facts,
@@ -118,10 +116,11 @@ fn judged(shape: &Shape) -> Vec<Fact> {
 }
 
 /// The strips that are matched the other way round, beside the matching.
-fn exchanged(width: u64, rows: u64) -> Vec<Fact> {
+fn exchanged(shape: &Shape) -> Vec<Fact> {
+    let (width, rows) = (shape.width, shape.exchanged_rows());
     vec![
-        each("detector/mod.rs", "for strip in 0..EXCHANGE_ROWS", EXCHANGED),
-        each("detector/mod.rs", "for y in top..top", rows / EXCHANGED),
+        each("detector/mod.rs", "for strip in 0..EXCHANGE_ROWS", shape.exchanged),
+        each("detector/mod.rs", "for y in top..top", rows / shape.exchanged),
         each("detector/mod.rs", "let values = row.iter().fold", width),
         total("rectify/sample.rs", "for chunk in", 2 * rows * (width / 8)),
         each("rectify/mod.rs", "for (to, from) in copied", width),

@@ -16,7 +16,8 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
     let chunks = decided / 64;
     let filtered = of("filtered_pixels") / 3;
     let margin = u64::from(settings.window_height) / 2 + 3;
-    let rows = shape.height - 2 * margin + 8;
+    let rows = shape.height - 2 * margin + shape.exchanged;
+    let begins = 1 + shape.exchanged;
     let blocks = disparities.div_ceil(8);
     let starts = of("costs_begun_afresh") / disparities;
     // Chunks of a row that is gone through as a whole: what comes on top of them begins afresh.
@@ -28,7 +29,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
     Stage {
         name: "match",
         // Each row that comes is asked for one that goes until there is none.
-        entries: vec![("entry_match_begin", 9), ("entry_match_push", pushed), ("entry_match_pull", 2 * pushed)],
+        entries: vec![("entry_match_begin", begins), ("entry_match_push", pushed), ("entry_match_pull", 2 * pushed)],
         facts: [
             vec![
                 never("arch/plain.rs", ""),
@@ -50,13 +51,13 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 total(
                     "arch/thumb/slide.rs",
                     "for (x, &left_in) in (0..width).zip(enter.left)",
-                    9 * u64::from(settings.window_height) * width,
+                    begins * u64::from(settings.window_height) * width,
                 )
                 .of("rows in"),
                 total(
                     "arch/thumb/slide.rs",
                     "for (sums, right_in)",
-                    9 * u64::from(settings.window_height) * width * disparities / 4,
+                    begins * u64::from(settings.window_height) * width * disparities / 4,
                 ),
                 // Rows that go.
                 total("matching/mod.rs", "out.fill(DisparityPixel", 2 * pushed * width).by(2),
@@ -122,7 +123,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 unwritten("fencepost_core::matching::Matcher::pass", chunks + 2 * rows),
             ],
             // Rows, and the sums of all columns of nine pictures and strips that begin.
-            library([32, width / 4], [9 * (width * disparities / 2 + width), 0]),
+            library([32, width / 4], [begins * (width * disparities / 2 + width), 0]),
         ]
         .concat(),
         calls: vec![
