@@ -143,8 +143,8 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
         let told = stage.groups.iter().find(|(group, _)| *group == name);
         program.limit(sum, told.map_or(most, |(_, most)| *most));
     }
-    match memory::words_behind_words(&|at| plain(image.name(at)), &functions, &calls) {
-        Ok(sum) => program.limit(sum, 0),
+    match memory::behind_words(&|at| plain(image.name(at)), &functions, &calls) {
+        Ok(limits) => limits.into_iter().for_each(|sum| program.limit(sum, 0)),
         Err(why) => faults.push(why),
     }
     for (number, sum) in together {
