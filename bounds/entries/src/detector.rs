@@ -306,6 +306,31 @@ fn entry_cross_check(other: &mut OtherMap<CELLS>, map: &mut ObstacleMap<CELLS>, 
 }
 
 #[unsafe(no_mangle)]
+fn entry_health_begin(detector: &mut Whole, width: usize, height: usize) {
+    detector.begin_health(width, height);
+}
+
+#[unsafe(no_mangle)]
+fn entry_health_rows(
+    detector: &mut Whole,
+    y: usize,
+    rows: &[&[u8]; 2],
+    spans: &[ValidSpan; 2],
+    disparities: (usize, usize),
+) {
+    detector.look_at_rows(y, *rows, *spans, disparities);
+}
+
+#[unsafe(no_mangle)]
+fn entry_health_judge<'a>(
+    detector: &'a mut Whole,
+    left: &Picture<'_>,
+    right: &Picture<'_>,
+) -> Option<&'a Detection<OBSTACLES, CELLS>> {
+    detector.judge_health(left, right)
+}
+
+#[unsafe(no_mangle)]
 fn entry_exposure(picture: &Picture<'_>) -> Exposure {
     Exposure::of(picture)
 }

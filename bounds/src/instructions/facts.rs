@@ -1,5 +1,6 @@
 //! How often the loops of the machine code go round.
 
+mod health;
 mod matching;
 
 use super::memory::library;
@@ -66,6 +67,11 @@ impl Fact {
             by_ways_back: false,
             is_shared: false,
         }
+    }
+
+    const fn by_ways_back(mut self) -> Self {
+        self.by_ways_back = true;
+        self
     }
 
     const fn entered(mut self, times: u64) -> Self {
@@ -139,12 +145,17 @@ const fn each(file: &'static str, text: &'static str, each: u64) -> Fact {
     Fact::new(At::Line(file, text), each, 0)
 }
 
-pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
+/// The most steps of a loop of a stage, by their names.
+fn looked_up(shape: &Shape) -> impl Fn(&str, &str) -> u64 + use<> {
     let works = shape.stages();
-    let of = |stage: &str, name: &str| -> u64 {
+    move |stage, name| {
         let work = works.iter().find(|work| work.stage == stage).expect("a stage");
         work.loops.iter().find(|(other, _)| *other == name).expect("a loop").1
-    };
+    }
+}
+
+pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
+    let of = looked_up(shape);
     let (width, height) = (shape.width, shape.height);
     let pixels = width * height;
     let rows_of_tiles = height * width.div_ceil(32);
@@ -365,7 +376,7 @@ Stage {
             groups: vec![],
         },
         matching::picture(shape),
-        matching::exchange(shape),
+        health::stage(shape, &of),
     ]
 }
 
@@ -390,9 +401,7 @@ fn rectify(width: u64, rows: u64) -> Stage {
 
 /// A loop that goes down the heap of the wire: it goes on with each exchange.
 const fn sifts(text: &'static str, more: u64) -> Fact {
-    let mut fact = Fact::new(At::Line("wire/select.rs", text), 0, more);
-    fact.by_ways_back = true;
-    fact
+    total("wire/select.rs", text, more).by_ways_back()
 }
 
 /// What a line writes.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     facts::{At, Fact},
-    program::{Count, Sum},
+    program::{Count, Sum, rounds},
 };
 use crate::image::Graph;
 
@@ -14,55 +14,87 @@ const MEMCPY: &str = "compiler_builtins::mem::memcpy";
 /// Copies of whole words.
 const MEMCPY_OF_WORDS: [&str; 2] = ["__aeabi_memcpy4", "__aeabi_memcpy8"];
 
+/// Fills and copies of any bytes, and their loops of words. Behind those is a loop of bytes.
+const WORDS: [(&str, &[usize]); 3] = [("__aeabi_memclr", &[1]), ("__aeabi_memset", &[1]), (MEMCPY, &WORDS_OF_MEMCPY)];
+const BYTES_BEHIND: usize = 2;
+
 /// Where words are copied that need not be whole ones: those that lie alike, and those that lie across the words that are read.
 const WORDS_OF_MEMCPY: [usize; 2] = [1, 3];
 
 /// The memory functions: each fill and copy has so many words at most, the first where it is known that they are whole words, and some have
 /// so many more together: fills, and copies, whichever function does them.
-pub(super) fn library([aligned, each]: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
-    let fact = |at, each, more, group| Fact { group, is_shared: true, ..Fact::new(at, each, more) };
-    let words = |loops, each, more, group| fact(At::LoopsOf(loops), each, more, Some(group));
-    let fills = &[("__aeabi_memclr", 1), ("__aeabi_memset", 1)];
-    let fills_of_words =
-        &[("__aeabi_memclr4", 0), ("__aeabi_memclr8", 0), ("__aeabi_memset4", 0), ("__aeabi_memset8", 0)];
-    let copies = const { &[(MEMCPY, WORDS_OF_MEMCPY[0]), (MEMCPY, WORDS_OF_MEMCPY[1])] };
-    let copies_of_words = const { &[(MEMCPY_OF_WORDS[0], 0), (MEMCPY_OF_WORDS[1], 0)] };
+pub(super) fn library(each: [u64; 2], [filled, copied]: [u64; 2]) -> Vec<Fact> {
+    [fills(each, filled), copies(each, copied)].concat()
+}
+
+/// The fills alone.
+pub(super) fn fills([aligned, each]: [u64; 2], more: u64) -> Vec<Fact> {
+    let by_word = &[("__aeabi_memclr4", 0), ("__aeabi_memclr8", 0), ("__aeabi_memset4", 0), ("__aeabi_memset8", 0)];
     let mut facts = vec![
-        words(fills, each, filled, "filled"),
-        words(fills_of_words, aligned, filled, "filled"),
-        words(copies, each, copied, "copied"),
-        words(copies_of_words, aligned, copied, "copied"),
+        words(&[("__aeabi_memclr", 1), ("__aeabi_memset", 1)], each, more, "filled"),
+        words(by_word, aligned, more, "filled"),
     ];
-    // Bytes to the first word, and behind the last one; fewer than 16 have no words.
-    for name in ["__aeabi_memclr", "__aeabi_memset", MEMCPY] {
-        facts.extend([(0, 3), (2, 15)].map(|(nth, bytes)| fact(At::LoopOf(name, nth), bytes, 0, None)));
-    }
-    facts.extend(fills_of_words.map(|(name, _)| fact(At::LoopOf(name, 1), 3, 0, None)));
+    facts.extend(["__aeabi_memclr", "__aeabi_memset"].map(bytes).concat());
+    facts.extend(by_word.map(|(name, _)| shared(At::LoopOf(name, 1), 3, 0)));
     facts
 }
 
-/// How often copies come to words more often than they are called for them: a copy of whole words leaves less than a word to them.
+/// The copies alone.
+pub(super) fn copies([aligned, each]: [u64; 2], more: u64) -> Vec<Fact> {
+    let any = const { &[(MEMCPY, WORDS_OF_MEMCPY[0]), (MEMCPY, WORDS_OF_MEMCPY[1])] };
+    let by_word = const { &[(MEMCPY_OF_WORDS[0], 0), (MEMCPY_OF_WORDS[1], 0)] };
+    let mut facts = vec![words(any, each, more, "copied"), words(by_word, aligned, more, "copied")];
+    facts.extend(bytes(MEMCPY));
+    facts
+}
+
+/// Bytes to the first word, and behind the last one; fewer than 16 have no words.
+fn bytes(name: &'static str) -> Vec<Fact> {
+    [(0, 3), (BYTES_BEHIND, 15)].map(|(nth, bytes)| shared(At::LoopOf(name, nth), bytes, 0)).to_vec()
+}
+
+fn words(loops: &'static [(&'static str, usize)], each: u64, more: u64, group: &'static str) -> Fact {
+    Fact { group: Some(group), ..shared(At::LoopsOf(loops), each, more) }
+}
+
+const fn shared(at: At, each: u64, more: u64) -> Fact {
+    Fact { is_shared: true, ..Fact::new(at, each, more) }
+}
+
+/// What is never more than zero: bytes behind the words of a fill or a copy more than three each time, or more than 15 if there are no
+/// words; and copies that come to words more often than they are called for them, since a copy of whole words leaves less than one.
 ///
 /// # Errors
-/// Copies of less than a word cannot be told by the way that they take from the beginning.
-pub(super) fn words_behind_words(
+/// What is less than 16 bytes cannot be told by the way that it takes from the beginning.
+pub(super) fn behind_words(
     name: &dyn Fn(u32) -> String,
     functions: &BTreeMap<u32, Graph>,
     calls: &BTreeMap<u32, Vec<Count>>,
-) -> Result<Sum, String> {
-    let Some((&at, graph)) = functions.iter().find(|(at, _)| name(**at) == MEMCPY) else { return Ok(Vec::new()) };
-    let found = graph.loops();
-    let heads: BTreeSet<usize> = WORDS_OF_MEMCPY.iter().filter_map(|nth| found.get(*nth)).map(|one| one.head).collect();
-    let first = &graph.blocks[0].next;
-    let to_words: Vec<_> = first.iter().filter(|next| !graph.reached_from(**next).is_disjoint(&heads)).collect();
-    if to_words.is_empty() || to_words.len() == first.len() {
-        return Err(format!("copies of less than a word take no way of their own from {at:#x}: {MEMCPY}"));
+) -> Result<Vec<Sum>, String> {
+    let mut limits = Vec::new();
+    for (&at, graph) in functions {
+        let name_of_it = name(at);
+        let Some((_, words)) = WORDS.iter().find(|(of, _)| *of == name_of_it) else { continue };
+        let found = graph.loops();
+        let heads: BTreeSet<usize> = words.iter().filter_map(|nth| found.get(*nth)).map(|one| one.head).collect();
+        let is_to_words = |next: &usize| !graph.reached_from(*next).is_disjoint(&heads);
+        let (to_words, to_bytes): (Vec<usize>, Vec<usize>) =
+            graph.blocks[0].next.iter().partition(|next| is_to_words(next));
+        let (Some(bytes), false, false) = (found.get(BYTES_BEHIND), to_words.is_empty(), to_bytes.is_empty()) else {
+            return Err(format!("less than 16 bytes take no way of their own from {at:#x}: {name_of_it}"));
+        };
+        let ways =
+            |to: &[usize], factor: f64| -> Sum { to.iter().map(|next| (Count::Way(at, 0, *next), factor)).collect() };
+        let (bytes, _) = rounds(at, graph, bytes, false, &[]);
+        limits.push([bytes, ways(&to_words, -3.0), ways(&to_bytes, -15.0)].concat());
+        if name_of_it == MEMCPY {
+            let called = calls.get(&at).into_iter().flatten().filter(
+                |call| !matches!(call, Count::Block(from, _) if MEMCPY_OF_WORDS.contains(&name(*from).as_str())),
+            );
+            limits.push(ways(&to_words, 1.0).into_iter().chain(called.map(|call| (*call, -1.0))).collect());
+        }
     }
-    let is_of_words =
-        |call: &Count| matches!(call, Count::Block(from, _) if MEMCPY_OF_WORDS.contains(&name(*from).as_str()));
-    let called = calls.get(&at).into_iter().flatten().filter(|call| !is_of_words(call));
-    let words = to_words.into_iter().map(|next| (Count::Way(at, 0, *next), 1.0));
-    Ok(words.chain(called.map(|call| (*call, -1.0))).collect())
+    Ok(limits)
 }
 
 /// Words that copies, or fills, go through for their calls: those that the code of a call says, or as many as `most` says of one.
@@ -94,21 +126,26 @@ mod tests {
     }
 
     /// Copies at 100, called by a copy of words at 0 and by something else at 50.
-    fn called(blocks: Vec<Block>) -> Result<Sum, String> {
+    fn called(blocks: Vec<Block>) -> Result<Vec<Sum>, String> {
         let name = |at| [MEMCPY_OF_WORDS[0], "something else", MEMCPY][at as usize / 50].to_owned();
         let functions = BTreeMap::from([(100, Graph { blocks })]);
-        words_behind_words(&name, &functions, &BTreeMap::from([(100, vec![Count::Block(0, 1), Count::Block(50, 2)])]))
+        behind_words(&name, &functions, &BTreeMap::from([(100, vec![Count::Block(0, 1), Count::Block(50, 2)])]))
     }
 
     #[test]
-    fn a_copy_of_words_leaves_no_words_behind() {
+    fn words_leave_a_few_bytes_behind_and_copies_of_words_no_words() {
         // Bytes in front, words, bytes behind, and words that lie across; few bytes go straight to those behind.
         let loops = [block(&[1, 3]), block(&[1, 2]), block(&[2, 3]), block(&[3, 4]), block(&[4, 5]), block(&[])];
         let mut blocks = loops.to_vec();
         blocks[3] = block(&[3, 5]);
         blocks[1] = block(&[1, 2, 4]);
         blocks[4] = block(&[4, 3]);
-        assert_eq!(called(blocks).unwrap(), [(Count::Way(100, 0, 1), 1.0), (Count::Block(50, 2), -1.0)]);
+        let [bytes, words] = &called(blocks).unwrap()[..] else { panic!("two limits") };
+        assert_eq!(
+            bytes[..],
+            [(Count::Block(100, 3), 1.0), (Count::Way(100, 0, 1), -3.0), (Count::Way(100, 0, 3), -15.0)]
+        );
+        assert_eq!(words[..], [(Count::Way(100, 0, 1), 1.0), (Count::Block(50, 2), -1.0)]);
         // All copies go through all loops.
         let mut blocks = loops.to_vec();
         blocks[0] = block(&[1]);

@@ -162,8 +162,8 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
         sum.extend(words.into_iter().map(|(call, words)| (call, -words)));
         program.limit(sum, beside);
     }
-    match memory::words_behind_words(&name, &functions, &calls) {
-        Ok(sum) => program.limit(sum, 0),
+    match memory::behind_words(&name, &functions, &calls) {
+        Ok(limits) => limits.into_iter().for_each(|sum| program.limit(sum, 0)),
         Err(why) => faults.push(why),
     }
     for (number, sum) in together {

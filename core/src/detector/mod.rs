@@ -2,6 +2,8 @@
 
 mod bands;
 mod detection;
+#[cfg(feature = "health-apart")]
+mod health_apart;
 #[cfg(feature = "interpret")]
 mod interpret;
 mod interpreter;

@@ -2,7 +2,7 @@
 
 use fencepost_core::matching::{MatchSettings, Prefilter};
 
-use super::{Stage, each, library, line_of, rectify, total, unwritten};
+use super::{Stage, each, library, line_of, total, unwritten};
 use crate::work::Shape;
 
 /// The matching of the picture: each row that comes is asked for one that goes until there is none.
@@ -10,15 +10,10 @@ pub(super) fn picture(shape: &Shape) -> Stage {
     facts("match", shape, [1, 0], [shape.height, 2 * shape.height])
 }
 
-/// Strips that are rectified and matched the other way round where hardly anything matches, of which one row each is asked for.
-pub(super) fn exchange(shape: &Shape) -> Stage {
-    let (strips, pushed) = (Shape::EXCHANGED, shape.exchanged_rows());
-    let rows = rectify(shape.width, 2 * pushed);
-    let mut stage = facts("exchange", shape, [0, strips], [pushed, strips]);
-    stage.entries.extend(rows.entries);
-    // Its own come first: of the memory functions what is said of the matching is true of both.
-    stage.facts.extend(rows.facts);
-    stage
+/// Strips that are matched the other way round where hardly anything matches, of which one row each is asked for.
+pub(super) fn strips(shape: &Shape) -> Stage {
+    let strips = Shape::EXCHANGED;
+    facts("strips", shape, [0, strips], [shape.exchanged_rows(), strips])
 }
 
 /// The matching by census with the instructions of the processor, of a picture or of strips, where `begins` pictures are begun, `pushed`
