@@ -355,7 +355,7 @@ fn calibration(stage: &str, numbers: &[u32; 12]) -> StereoCalibration {
             camera.fy = camera.fx;
             right = camera;
         }
-        "match" if how % 4 == 3 => right.cx += (number % 64) as f32,
+        "match" | "health" if how % 4 == 3 => right.cx += (number % 64) as f32,
         _ => return StereoCalibration::Rectified(pair),
     }
     let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));

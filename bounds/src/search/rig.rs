@@ -226,7 +226,7 @@ fn calibration(width: usize, height: usize, stage: &str, numbers: &[u32; 12]) ->
             camera.fy = camera.fx;
             right = camera;
         }
-        "match" if how % 4 == 3 => right.cx += (number % 64) as f32,
+        "match" | "health" if how % 4 == 3 => right.cx += (number % 64) as f32,
         _ => return StereoCalibration::Rectified(pair),
     }
     let turn = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]];
