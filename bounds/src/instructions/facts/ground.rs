@@ -18,7 +18,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
         name: "ground",
         entries: vec![("entry_ground_run", 1)],
         facts: [
-            regions(shape, 2, of("pairs"), of("surfaces_moved")),
+            regions(shape, 2, of("pairs")),
             angles(),
             vec![
                 // Surfaces that touch have to be where ground can be.
@@ -50,7 +50,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 total(
                     "ground/terrain.rs",
                     "let table = self.surfaces.of_tile || if table.is_empty()",
-                    2 * 3 * rows * width.div_ceil(32),
+                    3 * rows * width.div_ceil(32),
                 ),
                 // One round of three follows the ground.
                 ran("ground/terrain.rs", "Round::Follow => self.terrain.follow(&points, self.bend)", of("pixels") / 3),
@@ -60,12 +60,18 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
                 each("ground/terrain.rs", "for rows in patches || for first in (0..ACROSS)", 40),
                 each("ground/terrain.rs", "for (patches, before) in || let own = *patches || *patches =", 40).by(10),
             ],
-            // Lines of patches are all that is copied: whole words.
-            (0..4).map(|nth| words("compiler_builtins::mem::memcpy", nth, if nth == 1 { 40 * lines } else { 0 })).collect(),
+            // Lines of patches are all that is copied: whole words, rows in and out.
+            vec![
+                words("compiler_builtins::mem::memcpy", 0, 0),
+                words("compiler_builtins::mem::memcpy", 1, 40 * lines).of("copied"),
+                words("compiler_builtins::mem::memcpy", 2, 0),
+                words("compiler_builtins::mem::memcpy", 3, 0),
+                words("__aeabi_memcpy4", 0, 40 * lines).of("copied"),
+            ],
             // What hangs together, two bytes for each surface, twice.
             vec![words("__aeabi_memset4", 0, surfaces)],
             // What the surfaces of a tile say, a byte for each of 65, and the patches.
-            library([16; 2], [3 * 2 * 1600 + 1600, 40 * lines]),
+            library([16; 2], [3 * 2 * 1600 + 1600, 0]),
         ]
         .concat(),
         calls: vec![
@@ -73,7 +79,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
             ("fencepost_core::ground::terrain::spread", 6),
             ("libm::math::rem_pio2f::rem_pio2f", 0),
         ],
-        groups: vec![],
+        groups: vec![("copied", 40 * lines)],
     }
 }
 
@@ -84,7 +90,7 @@ pub(super) fn obstacles(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage 
         name: "obstacles",
         entries: vec![("entry_obstacles_run", 1)],
         facts: [
-            regions(shape, 1, of("pairs"), of("surfaces_moved")),
+            regions(shape, 1, of("pairs")),
             vec![
                 total("obstacles/mod.rs", "for root in regions.roots()", surfaces),
                 total("obstacles/mod.rs", "for member in regions.members(root)", surfaces),
@@ -107,9 +113,8 @@ pub(super) fn obstacles(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage 
     }
 }
 
-/// The joining of surfaces over the borders of tiles, `times` times, past so many pairs of pixels, with so many steps to what becomes
-/// another region.
-fn regions(shape: &Shape, times: u64, pairs: u64, moved: u64) -> Vec<Fact> {
+/// The joining of surfaces over the borders of tiles, `times` times, past so many pairs of pixels.
+fn regions(shape: &Shape, times: u64, pairs: u64) -> Vec<Fact> {
     let (down, across) = tiles(shape);
     vec![
         total("surfaces/join.rs", "for (place, (parent, next)) in", times * shape.surfaces),
@@ -123,7 +128,13 @@ fn regions(shape: &Shape, times: u64, pairs: u64, moved: u64) -> Vec<Fact> {
         ),
         // Each time there is a region less.
         ran("surfaces/join.rs", "let (keep, give) = if", times * (shape.surfaces - 1)),
-        total("surfaces/join.rs", "while of_a != a || if place == give || self.parent.get_mut(place)", moved),
+        total("surfaces/join.rs", "while of_a != a", times * told(shape)),
+        total(
+            "surfaces/join.rs",
+            "if place == give || self.parent.get_mut(place) || *parent = keep",
+            times * told(shape),
+        )
+        .early(4),
         each("surfaces/join.rs", "for place in 0..self.len", shape.surfaces),
         each("surfaces/join.rs", "for (place, next) in (0..self.len)", shape.surfaces),
         each("surfaces/join.rs", "for place in (0..self.len).rev()", shape.surfaces),
@@ -141,8 +152,14 @@ fn tiles(shape: &Shape) -> (u64, u64) {
 
 /// Pairs of surfaces that touch across the border of a tile and are not those that touched before: the first of each border, and one
 /// whenever the surface on one side is another. All around a tile its surfaces never lie crosswise (a b a b), as each hangs together
-/// within it: another one comes at most twice for each of them (Davenport and Schinzel, 1965).
-fn touching(shape: &Shape) -> u64 {
-    let (down, across) = tiles(shape);
-    down * (across - 1) + (down - 1) * across + 2 * shape.surfaces
+/// within it: another one comes at most twice for each of them but the first (Davenport and Schinzel, 1965). The two that are left for
+/// each tile are those that its right and its lower border begin with.
+const fn touching(shape: &Shape) -> u64 {
+    2 * shape.surfaces
+}
+
+/// Surfaces that are told of another region at most: the smaller ones of two each time. Two of the same size cost the most: with `n`
+/// in the end, half of them, then half of each half: `n / 2 log2 n`.
+fn told(shape: &Shape) -> u64 {
+    shape.surfaces / 2 * u64::from(shape.surfaces.ilog2() + 1)
 }
