@@ -180,19 +180,23 @@ impl Stages {
             return told(stage, clock);
         }
         let mut pair = pair();
+        let on_mast = how / 288 % 2 == 1;
         match how / 48 % 3 {
             0 => {}
             long => {
-                let (focal, share) = if long == 1 { (4.0, 0.65) } else { (8.0, 0.3) };
+                let (focal, share) = (4.0 * long as f32, if long == 1 || on_mast { 0.65 } else { 0.3 });
                 pair.focal_px = focal * WIDTH as f32;
                 pair.baseline_m = share * DISPARITIES as f32 * 29.6 / pair.focal_px;
             }
         }
         let pitch_down_deg = [0.0, 10.0, 30.0, 55.0, -20.0, -55.0][how as usize % 6];
-        let height_m = Some(0.3 * (how / 6 % 8) as f32).filter(|height_m| *height_m > 0.0);
+        // A camera that looks ahead or back, of a robot or on a mast.
+        let yaw_left_deg = if how / 144 % 2 == 0 { 0.0 } else { -135.0 };
+        let step_m = if on_mast { 1.5 } else { 0.3 };
+        let height_m = Some(step_m * (how / 6 % 8) as f32).filter(|height_m| *height_m > 0.0);
         let mount = Mount { height_m, pitch_down_deg, ..Mount::default() };
         let Ok(frame) = VehicleFrame::new(&mount) else { fail("the mount cannot be used") };
-        let (rays, place) = (Rays::new(&pair, &frame), Place::new(&mount));
+        let (rays, place) = (Rays::new(&pair, &frame), Place::new(&Mount { yaw_left_deg, ..mount }));
         self.depth.configure(&pair, 0, DISPARITIES as u16);
         let known = mount.height_m.is_some();
         if self.surfaces.configure(&settings.surfaces, WIDTH, HEIGHT).is_err()

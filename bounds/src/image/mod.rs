@@ -7,9 +7,8 @@ mod graph;
 mod source;
 
 pub(crate) use flow::Analysis;
-#[cfg(test)]
-pub(crate) use graph::Block;
-pub(crate) use graph::{Graph, Loop};
+
+pub(crate) use graph::{Block, Graph, Loop};
 pub(crate) use source::{Line, plain};
 
 use std::{collections::BTreeMap, path::Path};

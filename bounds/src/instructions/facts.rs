@@ -1,5 +1,6 @@
 //! How often the loops of the machine code go round.
 
+mod ground;
 mod health;
 mod matching;
 
@@ -23,6 +24,8 @@ pub(super) enum At {
     Unwritten(&'static str),
     /// No loop, but what a line of the core writes to memory, wherever it was inlined.
     Written(&'static str, &'static str),
+    /// No loop: the code of a line, and of what was inlined there, but for the loops in it. Each block of it runs so often.
+    Code(&'static str, &'static str),
 }
 
 /// How often it goes round: so often each time it is entered, and so often more for a frame. Loops that are told of the same are that
@@ -108,7 +111,7 @@ impl Fact {
 
     pub(super) fn place(&self) -> String {
         match self.at {
-            At::Line(file, text) | At::Written(file, text) => format!("{file}: {text}"),
+            At::Line(file, text) | At::Written(file, text) | At::Code(file, text) => format!("{file}: {text}"),
             At::LineOf(name, file, text) => format!("{file}: {text} in {name}"),
             At::Function(name) => name.to_owned(),
             At::LoopOf(name, nth) => format!("loop {nth} of {name}"),
@@ -154,6 +157,11 @@ fn looked_up(shape: &Shape) -> impl Fn(&str, &str) -> u64 + use<> {
     }
 }
 
+/// What runs so often at most.
+const fn ran(file: &'static str, text: &'static str, more: u64) -> Fact {
+    Fact::new(At::Code(file, text), 0, more)
+}
+
 pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
     let of = looked_up(shape);
     let (width, height) = (shape.width, shape.height);
@@ -161,11 +169,9 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
     let rows_of_tiles = height * width.div_ceil(32);
     let (tiles_down, tiles) = (height.div_ceil(32), height.div_ceil(32) * width.div_ceil(32));
     let cells = shape.settings.map.geometry.len() as u64;
-    let surfaces = shape.surfaces;
     let limit = shape.wire_runs.min(cells);
     // Runs that take the place of another in the list of the wire.
     let replaced = (of("wire", "sifts") - limit - (limit - 1) - sorting(limit)) / u64::from(limit.ilog2());
-    let terrain_rows = 3 * height.div_ceil(2);
     vec![
         rectify(width, 2 * height),
         Stage {
@@ -181,14 +187,26 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     each("links.rs", "for (to, from) in piece.iter_mut().zip(pixels)", width % 32),
                     // What stands for each, and what has ended.
                     total("validate/mod.rs", "for place in 0..used { then let Some(parent)", of("validate", "places")),
-                    total("validate/mod.rs", "for place in 0..used { then let (table, numbers)", of("validate", "places")),
-                    total("validate/mod.rs", "for (&here, above) in || renumbered.get_mut(root)", of("validate", "runs")),
+                    total(
+                        "validate/mod.rs",
+                        "for place in 0..used { then let (table, numbers)",
+                        of("validate", "places"),
+                    ),
+                    total(
+                        "validate/mod.rs",
+                        "for (&here, above) in || renumbered.get_mut(root)",
+                        of("validate", "runs"),
+                    ),
                     each("validate/mod.rs", "for place in 0..if below", width),
                     total("validate/mod.rs", "while let Some(Step", of("validate", "pixels_taken_out")),
                     // Each pixel once, wherever the walk comes to it from.
                     written("validate/mod.rs", "*pixel = none", of("validate", "pixels_taken_out")),
                     // How all pieces of the row above hang together is kept up to this width.
-                    written("validate/mod.rs", "None => Links::of(&pixels_above", if width <= 4096 { 0 } else { pixels }),
+                    written(
+                        "validate/mod.rs",
+                        "None => Links::of(&pixels_above",
+                        if width <= 4096 { 0 } else { pixels },
+                    ),
                 ],
                 // Pieces of 64 bytes; numbers of surfaces, 2 bytes each; entries of the surfaces that go on, 8 bytes each.
                 library([16, 16], [of("validate", "places").div_ceil(2), 2 * pixels]),
@@ -198,26 +216,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
             calls: vec![("fencepost_core::validate::SurfaceSize::take_out", pixels)],
             groups: vec![],
         },
-        Stage {
-            name: "obstacles",
-            entries: vec![("entry_obstacles_run", 1)],
-            facts: [
-                regions(shape, 1, &of),
-                vec![
-                    total("obstacles/mod.rs", "for root in regions.roots()", surfaces),
-                    total("obstacles/mod.rs", "for member in regions.members(root)", surfaces),
-                    total("obstacles/mod.rs", "for surface in members", surfaces),
-                    total("obstacles/mod.rs", ".position( || for listed in || core::mem::swap(listed", of("obstacles", "obstacles_passed")),
-                    // An angle of less than two turns is cut.
-                    function("compiler_builtins::math::full_availability::fmodf", 4, 0),
-                    function("compiler_builtins::int::specialized_div_rem::u64_div_rem", 64, 0),
-                ],
-                library([16; 2], [surfaces, 0]),
-            ]
-            .concat(),
-            calls: vec![],
-            groups: vec![],
-        },
+        ground::obstacles(shape, &of),
         Stage {
             name: "map",
             entries: vec![("entry_map_run", 1)],
@@ -225,7 +224,11 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                 vec![
                     total("map/builder.rs", "for (index, evidence) in", cells),
                     each("map/votes.rs", "for y0 in", tiles_down),
-                    total("map/votes.rs", "for x0 in || let found = self.surfaces.of_tile || if found.is_empty()", tiles),
+                    total(
+                        "map/votes.rs",
+                        "for x0 in || let found = self.surfaces.of_tile || if found.is_empty()",
+                        tiles,
+                    ),
                     total("map/votes.rs", "for (common, surface) in || *common = Common::of", of("map", "surfaces")),
                     total("map/votes.rs", "for y in y0", of("map", "rows_of_tiles")),
                     each("links.rs", "for (to, from) in piece.iter_mut().zip(pixels)", width % 32),
@@ -300,19 +303,30 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
                     total("surfaces/mod.rs", "farthest.iter().zip(", of("surfaces", "planes")),
                     total("surfaces/mod.rs", "if labels.iter().all(", pixels).early(4),
                     total("surfaces/moments.rs", "for z in z {", pixels),
-                    total("surfaces/moments.rs", "for ((z, square), column) || *square = ", 3 * 32 * rows_of_tiles).by(8),
+                    total("surfaces/moments.rs", "for ((z, square), column) || *square = ", 3 * 32 * rows_of_tiles)
+                        .by(8),
                     total("surfaces/moments.rs", "for (&square, column)", 3 * 32 * rows_of_tiles).by(8).written(8),
                     total("surfaces/mod.rs", "for (i, number) in renumbered", of("surfaces", "planes")),
                     total("surfaces/mod.rs", "for y in 0..tile.height { then for &label", rows_of_tiles),
                     total("surfaces/mod.rs", "for y in 0..tile.height { then let pixels", rows_of_tiles),
                     total("surfaces/mod.rs", "for y in 0..tile.height { then let v", rows_of_tiles),
                     total("surfaces/mod.rs", "for y in 0..tile.height { then for label", rows_of_tiles),
-                    total("surfaces/mod.rs", "for label in self.labels || *label = usize::from", pixels).by(4).written(8),
+                    total("surfaces/mod.rs", "for label in self.labels || *label = usize::from", pixels)
+                        .by(4)
+                        .written(8),
                     // Which are kept where there are too many.
                     total("surfaces/mod.rs", "for &label in self.labels", pixels).by(4),
-                    total("surfaces/mod.rs", "for &pixels in pixels.iter() || if let Some(count) = by_size", 51 * tiles),
+                    total(
+                        "surfaces/mod.rs",
+                        "for &pixels in pixels.iter() || if let Some(count) = by_size",
+                        51 * tiles,
+                    ),
                     each("surfaces/mod.rs", "for (i, &count) in by_size", 1024),
-                    each("surfaces/mod.rs", "*found = stage.go_through || let found = part.label_tiles || keep = part.keep_largest", tiles),
+                    each(
+                        "surfaces/mod.rs",
+                        "*found = stage.go_through || let found = part.label_tiles || keep = part.keep_largest",
+                        tiles,
+                    ),
                     each("surfaces/mod.rs", "part.measure_tiles::", tiles),
                 ],
                 angles(),
@@ -325,56 +339,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
             calls: vec![("libm::math::rem_pio2f::rem_pio2f", 0)],
             groups: vec![],
         },
-Stage {
-            name: "ground",
-            entries: vec![("entry_ground_run", 1)],
-            facts: [
-                regions(shape, 2, &of),
-                angles(),
-                vec![
-                    // With the height of the mount and without it, from five places, four times each.
-                    unwritten("fencepost_core::ground::GroundFinder::run", 2),
-                    total("ground/mod.rs", "for height in self.heights()", 2),
-                    total("ground/mod.rs", "for _ in 0..REGIONS", 2 * 3),
-                    total(
-                        "ground/mod.rs",
-                        "for root in regions.roots() || region.weight < below || if !table.get(root) || z <= allowance",
-                        7 * surfaces,
-                    ),
-                    total("ground/mod.rs", "let region = members.fold", 6 * surfaces),
-                    total("ground/mod.rs", "for place in regions.members(root)", surfaces),
-                    total(
-                        "ground/mod.rs",
-                        "for surface in regions.members(root) || if surface.class == SurfaceClass::Horizontal { || on_plane =",
-                        surfaces,
-                    ),
-                    each("ground/mod.rs", "for round in 0..REFINEMENTS", 4),
-                    total("ground/mod.rs", "for surface in table.iter().filter(tells)", 10 * 4 * surfaces),
-                    total("ground/mod.rs", "let pixels = table.iter().filter(below)", 10 * surfaces),
-                    total("ground/mod.rs", "for surface in table.iter().filter(|surface|", 4 * surfaces),
-                    each("ground/terrain.rs", "for round in [Round::Follow", 3),
-                    total("ground/terrain.rs", "for y in (0..self.picture.height())", terrain_rows),
-                    // Each row of tiles has 16 rows that are looked at.
-                    total("ground/terrain.rs", "for (says, surface) in", 3 * 16 * surfaces),
-                    // With those tiles that have nothing to say, in place of their pixels.
-                    total("ground/terrain.rs", "for x in (x0..end)", of("ground", "pixels")),
-                    total("ground/terrain.rs", "let table = self.surfaces.of_tile || if table.is_empty()", 2 * terrain_rows * width.div_ceil(32)),
-                    total("ground/terrain.rs", "backs.find_map", of("ground", "patches_looked_back")),
-                    total("ground/terrain.rs", "for (lift_m, (sum_m, weight)) in", 3 * 1600),
-                    // Rows and columns of patches, one at a time.
-                    each("ground/terrain.rs", "for rows in patches || for first in (0..ACROSS)", 40),
-                    each("ground/terrain.rs", "for (before, own) in || for (patches, before) in", 40),
-                ],
-                library([40, 40], [3 * 2 * 1600 + 1600 + 2 * 2 * surfaces, 0]),
-            ]
-            .concat(),
-            calls: vec![
-                ("fencepost_core::ground::GroundFinder::grow", 10),
-                ("fencepost_core::ground::terrain::spread", 6),
-                ("libm::math::rem_pio2f::rem_pio2f", 0),
-            ],
-            groups: vec![],
-        },
+        ground::stage(shape, &of),
         matching::picture(shape),
         health::stage(shape, &of),
     ]
@@ -418,26 +383,6 @@ fn sorting(limit: u64) -> u64 {
 /// than a number has.
 fn angles() -> Vec<Fact> {
     vec![function("libm::math::rem_pio2f::rem_pio2f", 0, 0), each("planes/eigen.rs", "libm::ilogbf", 24)]
-}
-
-/// The joining of surfaces over the borders of tiles, `times` times.
-fn regions(shape: &Shape, times: u64, of: &dyn Fn(&str, &str) -> u64) -> Vec<Fact> {
-    let stage = if times == 1 { "obstacles" } else { "ground" };
-    let (tiles_down, tiles) = (shape.height.div_ceil(32), shape.height.div_ceil(32) * shape.width.div_ceil(32));
-    vec![
-        total("surfaces/join.rs", "for (place, (parent, next)) in", times * shape.surfaces),
-        each("surfaces/join.rs", "for y0 in (0..height)", tiles_down),
-        total("surfaces/join.rs", "for x0 in (0..width)", times * tiles),
-        total("surfaces/join.rs", "for i in 0..border.length", of(stage, "pairs")),
-        total(
-            "surfaces/join.rs",
-            "while of_a != a || if place == give || self.parent.get_mut(place)",
-            of(stage, "surfaces_moved"),
-        ),
-        each("surfaces/join.rs", "for place in 0..self.len", shape.surfaces),
-        each("surfaces/join.rs", "for (place, next) in (0..self.len)", shape.surfaces),
-        each("surfaces/join.rs", "for place in (0..self.len).rev()", shape.surfaces),
-    ]
 }
 
 /// The loop of a function that no line leads back to the head of.

@@ -9,7 +9,7 @@ mod written;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{
-    image::{Graph, Image, Line, Loop, plain},
+    image::{Block, Graph, Image, Line, Loop, plain},
     work::Shape,
 };
 use facts::{Fact, Most, Stage};
@@ -126,6 +126,14 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
                 together.entry(number).or_default().extend(sum);
             }
         }
+        for (number, fact) in stage.facts.iter().enumerate() {
+            let facts::At::Code(file, text) = fact.at else { continue };
+            let of_line: Vec<bool> = graph.blocks.iter().map(|block| is_all_of(image, block, file, text)).collect();
+            for block in outside_loops(&of_line, &found) {
+                program.limit(vec![(Count::Block(at, block), 1.0)], fact.most.more);
+                used.insert(number);
+            }
+        }
     }
     for (number, fact) in stage.facts.iter().enumerate() {
         let facts::At::Written(file, text) = fact.at else { continue };
@@ -207,7 +215,7 @@ fn times_written(image: &Image, graph: &Graph, all: &[Loop], one: &Loop, fact: &
         for &address in &graph.blocks[block].instructions {
             let Some(mnemonic) = image.memory_mnemonic(address) else { continue };
             let lines = Chain::of(image, address);
-            if lines.is_within(&|chain| chain.is(file, text)) {
+            if lines.is_inlined_at(file, text) {
                 *times.entry(mnemonic.contains("ld")).or_default() += 1;
             }
         }
@@ -235,13 +243,30 @@ impl Chain {
         let lines: Vec<_> = self.0.iter().map(|(_, _, text, next)| (text.clone(), next.clone())).collect();
         self.0.first().is_some_and(|(of, ..)| of == file) && facts::is_meant(meant, &lines)
     }
+
+    /// Whether it or one that it was inlined into is such a one: what is written at a line may be a call.
+    fn is_within(&self, is: &dyn Fn(&Self) -> bool) -> bool {
+        (0..self.0.len()).any(|from| is(&Self(self.0[from..].to_vec())))
+    }
+
+    /// Whether it is of a line, or was inlined there.
+    fn is_inlined_at(&self, file: &str, meant: &str) -> bool {
+        self.is_within(&|chain| chain.is(file, meant))
+    }
 }
 
-impl Chain {
-    /// Whether it or one that it was inlined into is such a one: what is written at a line may be a call.
-    fn is_within(&self, is: &dyn Fn(&Chain) -> bool) -> bool {
-        (0..self.0.len()).any(|from| is(&Chain(self.0[from..].to_vec())))
-    }
+/// Whether all of a block that is known of a line is of this one, or was inlined there.
+fn is_all_of(image: &Image, block: &Block, file: &str, text: &str) -> bool {
+    let chains = block.instructions.iter().map(|&address| Chain::of(image, address));
+    let mut known = chains.filter(|chain| !chain.0.is_empty()).peekable();
+    known.peek().is_some() && known.all(|chain| chain.is_inlined_at(file, text))
+}
+
+/// Blocks of a line that run as often as the line: those in a loop that is of the line as well may run more often.
+fn outside_loops(of_line: &[bool], loops: &[Loop]) -> Vec<usize> {
+    let inner: Vec<&Loop> = loops.iter().filter(|one| of_line[one.head]).collect();
+    let is_outside = |block: &usize| of_line[*block] && !inner.iter().any(|one| one.blocks.contains(block));
+    (0..of_line.len()).filter(is_outside).collect()
 }
 
 /// Blocks of a loop that belong to none within it.
@@ -301,7 +326,7 @@ impl Place {
             }
             facts::At::Function(name) => self.function == name,
             facts::At::Unwritten(name) => self.function == name && self.lines.is_empty(),
-            facts::At::Written(..) => false,
+            facts::At::Written(..) | facts::At::Code(..) => false,
             facts::At::LoopOf(name, nth) => self.function == name && self.nth == nth,
             facts::At::LoopsOf(loops) => loops.contains(&(self.function.as_str(), self.nth)),
         }

@@ -183,9 +183,10 @@ impl Pattern {
             2 => scattered(x / across, y / down, 3) as usize % self.levels,
             // A roof over each tile.
             3 => 0,
-            // Blocks with a seam around each.
+            // Blocks with a seam around each; those of one level may begin some columns to the left.
             _ => {
-                if x.is_multiple_of(across) || y.is_multiple_of(down) {
+                let left = if self.levels == 1 { self.skew } else { 0 };
+                if (x + left).is_multiple_of(across) || y.is_multiple_of(down) {
                     return 0;
                 }
                 (x / across + self.skew * (y / down)) % self.levels

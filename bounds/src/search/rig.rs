@@ -113,16 +113,21 @@ macro_rules! rig {
                 }
                 let how = genome.numbers[11] as usize;
                 let mut pair = pair($width, $height);
-                if let Some((focal, share)) = [None, Some((4.0, 0.65)), Some((8.0, 0.3))][how / 48 % 3] {
+                let on_mast = how / 288 % 2 == 1;
+                let wide = if on_mast { 0.65 } else { 0.3 };
+                if let Some((focal, share)) = [None, Some((4.0, 0.65)), Some((8.0, wide))][how / 48 % 3] {
                     // Through a long lens, what lies at the end of the terrain has disparities that are fine enough for a slope.
                     pair.focal_px = focal * $width as f32;
                     pair.baseline_m = share * $disparities as f32 * 29.6 / pair.focal_px;
                 }
                 let pitch_down_deg = [0.0, 10.0, 30.0, 55.0, -20.0, -55.0][how % 6];
-                let height_m = Some(0.3 * (how / 6 % 8) as f32).filter(|height_m| *height_m > 0.0);
+                // A camera that looks ahead or back, of a robot or on a mast.
+                let yaw_left_deg = [0.0, -135.0][how / 144 % 2];
+                let step_m = if on_mast { 1.5 } else { 0.3 };
+                let height_m = Some(step_m * (how / 6 % 8) as f32).filter(|height_m| *height_m > 0.0);
                 let mount = Mount { height_m, pitch_down_deg, ..Mount::default() };
                 let frame = VehicleFrame::new(&mount).expect("it can be used");
-                let (rays, place) = (Rays::new(&pair, &frame), Place::new(&mount));
+                let (rays, place) = (Rays::new(&pair, &frame), Place::new(&Mount { yaw_left_deg, ..mount }));
                 let mut depth = DepthTable::<$disparities>::new();
                 depth.configure(&pair, 0, $disparities);
                 let picture = DisparityPicture::new(&pixels, $width);
