@@ -104,8 +104,8 @@ pub(super) fn obstacles(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage 
                 function("compiler_builtins::math::full_availability::fmodf", 0, 0),
                 function("compiler_builtins::int::specialized_div_rem::u64_div_rem", 0, 0),
             ],
-            // The sums of an obstacle.
-            library([10; 2], [surfaces, 0]),
+            // An obstacle, of 13 words, and the sums that it is made from.
+            library([13; 2], [surfaces, 0]),
         ]
         .concat(),
         // Both surfaces of each pair that touches, and those that stand for the regions.
