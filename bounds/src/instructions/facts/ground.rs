@@ -21,7 +21,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
             regions(shape, 2, of("pairs")),
             angles(),
             vec![
-                // Surfaces that touch have to be where ground can be.
+                // With the height of the mount and without it.
                 unwritten("fencepost_core::ground::GroundFinder::run", 2),
                 total("ground/mod.rs", "for height in self.heights()", 2),
                 total("ground/mod.rs", "for _ in 0..REGIONS", 2 * 3),
