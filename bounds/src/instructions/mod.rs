@@ -342,3 +342,18 @@ impl core::fmt::Display for Place {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn code_of_a_line_runs_as_often_as_the_line_but_for_loops_in_it() {
+        // Block 0 comes before a loop of 1 to 6, in which the line is 2 to 5; of them 3 and 4 go round.
+        let around = Loop { head: 1, blocks: (1..=6).collect(), backs: BTreeSet::from([6]) };
+        let inner = Loop { head: 3, blocks: BTreeSet::from([3, 4]), backs: BTreeSet::from([4]) };
+        let of_line = [false, false, true, true, true, true, false];
+        assert_eq!(outside_loops(&of_line, &[around.clone(), inner]), [2, 5]);
+        assert_eq!(outside_loops(&of_line, &[around]), [2, 3, 4, 5]);
+    }
+}

@@ -21,7 +21,7 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
             regions(shape, 2, of("pairs")),
             angles(),
             vec![
-                // Surfaces that touch have to be where ground can be.
+                // With the height of the mount and without it.
                 unwritten("fencepost_core::ground::GroundFinder::run", 2),
                 total("ground/mod.rs", "for height in self.heights()", 2),
                 total("ground/mod.rs", "for _ in 0..REGIONS", 2 * 3),
@@ -104,7 +104,8 @@ pub(super) fn obstacles(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage 
                 function("compiler_builtins::math::full_availability::fmodf", 0, 0),
                 function("compiler_builtins::int::specialized_div_rem::u64_div_rem", 0, 0),
             ],
-            library([16; 2], [surfaces, 0]),
+            // An obstacle, of 13 words, and the sums that it is made from.
+            library([13; 2], [surfaces, 0]),
         ]
         .concat(),
         // Both surfaces of each pair that touches, and those that stand for the regions.
@@ -117,7 +118,12 @@ pub(super) fn obstacles(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage 
 fn regions(shape: &Shape, times: u64, pairs: u64) -> Vec<Fact> {
     let (down, across) = tiles(shape);
     vec![
-        total("surfaces/join.rs", "for (place, (parent, next)) in", times * shape.surfaces),
+        total(
+            "surfaces/join.rs",
+            "for (place, (parent, next)) in || (*parent, *next) = (place",
+            times * shape.surfaces,
+        )
+        .by(40),
         each("surfaces/join.rs", "for y0 in (0..height)", down),
         total("surfaces/join.rs", "for x0 in (0..width)", times * down * across),
         total("surfaces/join.rs", "for i in 0..border.length", pairs),
@@ -135,7 +141,12 @@ fn regions(shape: &Shape, times: u64, pairs: u64) -> Vec<Fact> {
             times * told(shape),
         )
         .early(4),
-        each("surfaces/join.rs", "for place in 0..self.len", shape.surfaces),
+        each(
+            "surfaces/join.rs",
+            "for place in 0..self.len || *first = if || *parent = *first",
+            shape.surfaces.next_multiple_of(4),
+        )
+        .by(4),
         each("surfaces/join.rs", "for (place, next) in (0..self.len)", shape.surfaces),
         each("surfaces/join.rs", "for place in (0..self.len).rev()", shape.surfaces),
     ]
@@ -162,4 +173,57 @@ const fn touching(shape: &Shape) -> u64 {
 /// in the end, half of them, then half of each half: `n / 2 log2 n`.
 fn told(shape: &Shape) -> u64 {
     shape.surfaces / 2 * u64::from(shape.surfaces.ilog2() + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_pile_of_regions_has_more_told_than_is_bounded() {
+        // The most for each number of surfaces, over all ways to join two regions to one of that size.
+        let mut most = vec![0u64; 401];
+        for n in 2..=400 {
+            most[n] = (1..=n / 2).map(|small| most[small] + most[n - small] + small as u64).max().unwrap();
+            let shape = Shape { surfaces: n as u64, ..Shape::of(320, 240, 48) };
+            assert!(most[n] <= told(&shape), "{n} surfaces: {} of {}", most[n], told(&shape));
+        }
+    }
+
+    #[test]
+    fn surfaces_around_tiles_touch_no_more_than_is_bounded() {
+        // Surfaces around a tile that do not lie crosswise: the most changes of `n` of them are those of one between all others.
+        fn changes(around: &mut Vec<usize>, n: usize) -> usize {
+            let crosswise = |around: &[usize]| {
+                let [.., d] = *around else { return false };
+                let before = |end: usize, of: &dyn Fn(usize) -> bool| (0..end).rev().find(|&i| of(around[i]));
+                let last = around.len() - 1;
+                (0..last).any(|b| {
+                    around[b] != d
+                        && before(b, &|label| label == d)
+                            .is_some_and(|c| before(c, &|label| label == around[b]).is_some())
+                })
+            };
+            let mut most = around.len().saturating_sub(1);
+            for label in 0..n {
+                if around.last() == Some(&label) {
+                    continue;
+                }
+                around.push(label);
+                if !crosswise(around) {
+                    most = most.max(changes(around, n));
+                }
+                around.pop();
+            }
+            most
+        }
+        for n in 1..=4 {
+            assert_eq!(changes(&mut Vec::new(), n), 2 * n - 2, "{n} surfaces");
+        }
+        // A border for the right and the lower side of each tile at most.
+        let shape = Shape::of(320, 240, 48);
+        let (down, across) = tiles(&shape);
+        let borders = down * (across - 1) + (down - 1) * across;
+        assert!(borders + 2 * shape.surfaces - 2 * down * across <= touching(&shape));
+    }
 }
