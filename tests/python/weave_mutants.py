@@ -21,9 +21,6 @@ from pathlib import Path
 # A test that takes longer is left to what the quick ones let live.
 QUICK_S = 0.1
 
-# The choice between mutants, and the times of tests, need what is not stable.
-ENVIRONMENT = os.environ | {"RUSTC_BOOTSTRAP": "1"}
-
 # Errors that a mutant has wherever it stands: a type, a trait or a function that is not there.
 REFUSED = ("E0277", "E0369", "E0433", "E0599")
 
@@ -34,7 +31,7 @@ JUDGED = ("caught", "timeout", "unviable")
 def build(tree, targets):
     """Builds the woven tests: their programs, or the compiler's errors."""
     command = ["cargo", "test", "--locked", "--package", "fencepost-core", *targets, "--no-run"]
-    done = subprocess.run([*command, "--message-format=json"], cwd=tree, env=ENVIRONMENT, capture_output=True, text=True)
+    done = subprocess.run([*command, "--message-format=json"], cwd=tree, capture_output=True, text=True)
     messages = [json.loads(line) for line in done.stdout.splitlines()]
     programs = {m["target"]["name"]: m["executable"] for m in messages if m.get("executable")}
     errors = [m["message"] for m in messages if m["reason"] == "compiler-message" and m["message"]["level"] == "error"]
@@ -90,7 +87,7 @@ class Runs:
         return found
 
     def run(self, program, arguments, mutant, timeout_s):
-        environment = ENVIRONMENT | ({"MUTANT": str(mutant)} if mutant else {})
+        environment = os.environ | ({"MUTANT": str(mutant)} if mutant else {})
         command = [program, "-Zunstable-options", "--fail-fast", *arguments]
         return subprocess.run(
             command, cwd=self.directory, env=environment, timeout=timeout_s, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,

@@ -1,5 +1,7 @@
 //! Cells against plain evaluations in f64.
 
+mod bands;
+
 use std::{boxed::Box, vec, vec::Vec};
 
 use super::*;
