@@ -64,8 +64,12 @@ const WHOLE: ValidSpan = ValidSpan { start: 0, end: WIDTH as u16 };
 
 impl Eye {
     fn new() -> Self {
+        Self::with(MatchSettings::DEFAULT)
+    }
+
+    fn with(settings: MatchSettings) -> Self {
         let mut matcher = Box::new(Matcher::new());
-        let settings = MatchSettings { disparities: DISPARITIES as u16, ..MatchSettings::DEFAULT };
+        let settings = MatchSettings { disparities: DISPARITIES as u16, ..settings };
         matcher.configure(&settings, WIDTH, HEIGHT).unwrap();
         let bands = (0..5).map(|_| (RowLooks::new(), Ordinals::new())).collect();
         Self { content: Box::new(Content::new()), matcher, bands }
@@ -265,7 +269,7 @@ fn bands_say_what_the_whole_picture_says() {
 fn bands_see_blocks_rows_of_profiles_and_what_strips_need_whole() {
     for height in 1..3000 {
         let (unit, rows) = (unit_of_bands(height), height.div_ceil(256));
-        assert!(unit.is_multiple_of(BLOCK) && unit.is_multiple_of(rows), "{height}: {unit}");
+        assert!(unit > 0 && unit.is_multiple_of(BLOCK) && unit.is_multiple_of(rows), "{height}: {unit}");
         assert!((1..unit).all(|less| !less.is_multiple_of(BLOCK) || !less.is_multiple_of(rows)), "{height}: {unit}");
     }
     for (height, count, reach) in [(192, 3, 1), (240, 4, 2), (480, 5, 2), (64, 2, 1), (33, 3, 2), (1080, 8, 1)] {
@@ -280,4 +284,24 @@ fn bands_see_blocks_rows_of_profiles_and_what_strips_need_whole() {
             assert_eq!(rows_around(height, &band, reach), [above, below], "{height} rows, {band:?}");
         }
     }
+}
+
+#[test]
+fn a_place_is_looked_at_when_its_disparity_is_known() {
+    // A high window says disparities some rows after the last row that the look needs; without them most places were searched for.
+    let (left, right) = wall(0x5eed_018a, |x, y| (x, y));
+    for window_height in [5, 13, 21] {
+        let signs = Eye::with(MatchSettings { window_height, ..MatchSettings::DEFAULT }).look(&left, &right).rows;
+        assert!(signs.matches > 90, "{window_height} rows: {signs:?}");
+    }
+}
+
+#[test]
+fn what_was_cleared_is_no_moment_to_compare_with() {
+    let [first, second] = [0x5eed_018b, 0x5eed_018d].map(|seed| wall(seed, |x, y| (x, y)));
+    let mut eye = Eye::new();
+    assert_eq!(eye.look(&first.0, &first.1).pairing, PairingSign::default());
+    assert_ne!(eye.look(&second.0, &second.1).pairing, PairingSign::default());
+    eye.content.clear();
+    assert_eq!(eye.look(&first.0, &first.1).pairing, PairingSign::default());
 }

@@ -24,7 +24,13 @@ fn signature(profile: &Profile) -> Signature {
 
 #[test]
 fn the_best_pair_of_two_moments_is_that_of_a_plain_search() {
-    const ROWS: usize = 300;
+    // One row to a band, and two.
+    search(200, 200, 8);
+    search(300, 150, 4);
+}
+
+/// Sequences of pictures of `rows` rows; four rows either way are `reach` half bands.
+fn search(rows: usize, bands: usize, reach: isize) {
     let mut random = Random::seeded("moments", 0x5eed_0194);
     let mut pairing = Pairing::new();
     let (mut lags, mut stills, mut advantages) = ([0; 11], 0, 0);
@@ -36,7 +42,7 @@ fn the_best_pair_of_two_moments_is_that_of_a_plain_search() {
         for frame in 0..9 {
             // New, nearly as before, or very much the same, frame by frame.
             let mix = [1.0, 0.35, 0.12][random.below(3) as usize];
-            let mut scene: Vec<f64> = (0..ROWS).map(|_| random.within(40.0, 150.0)).collect();
+            let mut scene: Vec<f64> = (0..rows).map(|_| random.within(40.0, 150.0)).collect();
             if let Some(last) = scenes.last() {
                 scene.iter_mut().zip(last).for_each(|(new, last)| *new = mix * *new + (1.0 - mix) * last);
             }
@@ -47,13 +53,12 @@ fn the_best_pair_of_two_moments_is_that_of_a_plain_search() {
                 let scene = &scenes[scenes.len().saturating_sub(1 + late)];
                 let noise = [0.0, 3.0][random.below(2) as usize];
                 let moved = if round % 7 == 6 && side == 1 { 2 } else { 0 };
-                let rows = (0..ROWS).map(|y| scene[(y + moved) % ROWS] + noise * random.within(-1.0, 1.0));
+                let rows = (0..rows).map(|y| scene[(y + moved) % rows] + noise * random.within(-1.0, 1.0));
                 profile(&rows.collect::<Vec<f64>>())
             });
             let now = sides.each_ref().map(signature);
             let found = pairing.compare(&sides);
-            // Four rows either way are two bands of two rows, in steps of half a band.
-            let as_given = (-4..=4).map(|halves| now[0].likeness(&now[1], halves)).fold(-1.0, f32::max);
+            let as_given = (-reach..=reach).map(|halves| now[0].likeness(&now[1], halves)).fold(-1.0, f32::max);
             let still = [0, 1].map(|side| {
                 before.first().is_some_and(|before| (0.9..0.9995).contains(&now[side].likeness(&before[side], 0)))
             });
@@ -70,8 +75,8 @@ fn the_best_pair_of_two_moments_is_that_of_a_plain_search() {
             let expected = best.unwrap_or_default();
             assert_eq!((found.likeness, found.lag_frames), expected, "round {round}, frame {frame}");
             let z = |correlation: f32| f64::from(correlation).clamp(-0.999, 0.999).atanh();
-            // 150 bands.
-            let sigmas = if best.is_some() { (z(expected.0) - z(as_given)) * 147.0_f64.sqrt() } else { 0.0 };
+            let error = 1.0 / ((bands - 3) as f64).sqrt();
+            let sigmas = if best.is_some() { (z(expected.0) - z(as_given)) / error } else { 0.0 };
             assert!((f64::from(found.advantage_sigmas) - sigmas).abs() < 2.0e-2, "{found:?}, {sigmas}");
             lags[usize::from((found.lag_frames + 5) as u8)] += 1;
             stills += usize::from(still[0]) + usize::from(still[1]);

@@ -53,6 +53,17 @@ fn bands_of_rows_add_up_mean_grey_and_contrast() {
         };
         assert!(near(&found.grey, &grey) && near(&found.contrast, &contrast), "{height}");
     }
+    // Of each band one of two has seen all rows.
+    let rows = rows(&mut random, 30, 300);
+    let (mut upper, mut lower) = (Profile::new(), Profile::new());
+    upper.begin(300);
+    lower.begin(300);
+    for (y, (row, span)) in rows.iter().enumerate() {
+        if y < 128 { &mut upper } else { &mut lower }.push(y, row, *span);
+    }
+    upper.append(&lower);
+    let whole = profile(&rows);
+    assert_eq!((upper.grey, upper.contrast), (whole.grey, whole.contrast));
     let mut unset = Profile::new();
     unset.push(3, &[1, 2, 3, 4], ValidSpan { start: 0, end: 4 });
     assert_eq!((unset.bands(), unset.bands_in(7)), (0, 7), "no picture was begun");

@@ -207,3 +207,52 @@ fn few_matches_say_nothing() {
     assert_eq!(say(0, 4, 4), (0.0, 0, 50.0), "four of at least eight");
     assert_eq!(say(0, 16, 4), (0.0, 0, 25.0));
 }
+
+#[test]
+fn of_places_that_fit_alike_the_one_with_the_least_disparity_is_taken() {
+    let mut random = Random::seeded("alike", 0x5eed_0196);
+    for round in 0..300 {
+        let mut rows = Rows::random(&mut random);
+        let (width, period) = (rows.pixels.len(), 1 + random.below(25) as usize);
+        for (left, right) in rows.left.iter_mut().zip(&mut rows.right) {
+            for x in period..width {
+                (left[x], right[x]) = (left[x - period], right[x - period]);
+            }
+        }
+        for x in (3..width - 3).step_by(5) {
+            let (first, down) = (random.below(8) as usize, random.below(9) as usize);
+            let disparities = first..=first + random.below(60) as usize;
+            let found = best_at(Chosen::PLAIN, &rows.strip(), x, disparities.clone(), down);
+            assert_eq!(found, rows.best(x, disparities, down as isize - 4), "round {round}, period {period}");
+        }
+    }
+}
+
+#[test]
+fn near_is_what_fits_more_than_twice_as_well() {
+    // The patch of the left picture lies twice in the right one: within the range, and nearer, each with an error.
+    let mut random = Random::seeded("twice as well", 0x5eed_0197);
+    let near = |within: u8, nearer: u8, random: &mut Random| {
+        let mut rows: [Vec<Vec<u8>>; 2] =
+            [0, 1].map(|_| (0..15).map(|_| (0..80).map(|_| random.below(200) as u8).collect()).collect());
+        let [left, right] = &mut rows;
+        for (left, right) in left.iter().zip(right.iter_mut()) {
+            for x in 0..7 {
+                (right[57 - 3 + x], right[57 - 20 + x]) = (left[57 + x], left[57 + x]);
+            }
+        }
+        right[7][57] += within;
+        right[7][40] += nearer;
+        let whole = ValidSpan { start: 0, end: 80 };
+        let [left, right] = rows;
+        let rows = Rows { left, right, spans: [whole; 2], pixels: vec![] };
+        let mut matches = SparseMatches::new();
+        matches.begin();
+        let range = SearchRange { first: 0, last: 7 };
+        matches.look_at(&rows.strip(), 60, DisparityPixel::none(Reason::NotUnique), range, true);
+        (matches.near, matches.lower)
+    };
+    for (within, nearer, expected) in [(20, 10, 0), (21, 10, 1), (20, 9, 1), (20, 20, 0), (0, 0, 0)] {
+        assert_eq!(near(within, nearer, &mut random), (expected, 1), "{within} within the range, {nearer} beyond");
+    }
+}

@@ -129,3 +129,19 @@ fn structure_and_coverings_are_those_of_every_block() {
     std::println!("{covered} covered of {judged}, {unknown} tiles that are not known");
     assert!(covered > 300 && judged > 3000 && unknown > 300 && undecided < 20);
 }
+
+#[test]
+fn a_tile_is_covered_if_the_other_has_more_than_three_times_its_structure() {
+    // One tile of blocks that differ by so many sixteenths of a grey value.
+    let tile = |sixteenths: usize| {
+        let grey = |x: usize, y: usize| {
+            50 + u8::from(x / 4 % 2 == 1) * (sixteenths / 16 + usize::from(x % 4 + y % 4 * 4 < sixteenths % 16)) as u8
+        };
+        let rows = (0..16).map(|y| ((0..16).map(|x| grey(x, y)).collect(), ValidSpan { start: 0, end: 16 }));
+        Shown { width: 16, rows: rows.collect() }.tiles()
+    };
+    for (mine, theirs, covered) in [(12, 36, 0), (11, 36, 1), (12, 37, 1), (16, 64, 0), (15, 64, 1)] {
+        let found = tile(mine).lacks(&tile(theirs), (0, 0), 2.0);
+        assert_eq!((found.covered, found.judged), (covered, 1), "{mine} and {theirs} sixteenths");
+    }
+}
