@@ -73,6 +73,26 @@ fn rectified_pictures_pass_through() {
     assert_eq!(rectifier.row(Side::Left, &small, 10, &mut out), 0..0);
 }
 
+#[test]
+fn pictures_have_the_size_that_their_calibration_says_and_no_row_below_it() {
+    let passed = rectifier(&StereoCalibration::Rectified(plain(64, 48)));
+    assert_eq!([Side::Left, Side::Right].map(|side| passed.raw_size(side)), [(64, 48); 2]);
+    let mut raw = made_up()[0].1;
+    raw.right = CameraModel { width: 500, height: 400, ..raw.right };
+    let rotation = turned([0.0; 3]);
+    let pair = RectifiedPair { cx: 100.0, cy: 100.0, ..plain(64, 48) };
+    raw.rectification = Some(Rectification { left_rotation: rotation, right_rotation: rotation, pair });
+    let rectifier = rectifier(&StereoCalibration::Raw(raw));
+    assert_eq!([Side::Left, Side::Right].map(|side| rectifier.raw_size(side)), [(512, 384), (500, 400)]);
+    let white = vec![255; 512 * 384];
+    let picture = Picture::packed(&white, 512, 384).unwrap();
+    let mut out = [9; 70];
+    assert_eq!(rectifier.row(Side::Left, &picture, 47, &mut out), 0..64);
+    // The map reaches a little farther.
+    assert_eq!(rectifier.row(Side::Left, &picture, 48, &mut out), 0..0);
+    assert_eq!(out, [0; 70]);
+}
+
 /// Where raw and rectified camera are the same, every pixel keeps its value, those of the last row and column too.
 #[test]
 fn the_same_camera_gives_the_same_picture() {
