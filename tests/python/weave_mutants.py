@@ -43,6 +43,7 @@ def build(tree, targets):
 def weave(program, listed, tree, folder, sources, targets):
     """Weaves in what the compiler takes: the programs, the numbers that are in them, and those that cannot be built anywhere."""
     left_out, impossible = set(), set()
+    arms = {number for number, mutant in enumerate(json.loads(listed.read_text()), 1) if mutant["genre"] == "MatchArm"}
     while True:
         for path, text in sources.items():
             (tree / path).write_text(text)
@@ -61,6 +62,11 @@ def weave(program, listed, tree, folder, sources, targets):
                 for span in spans
             ]  # fmt: skip
             hit = next(filter(None, hits), [])
+            if not hit and spans:
+                # A match of which arms are behind conditions now and no longer cover everything: those behind the word that is told.
+                last = max([span["byte_end"] for child in error["children"] for span in child["spans"]], default=0)
+                hit = [int(number) for number, file, start, _, _ in places
+                       if file == spans[0]["file_name"] and spans[0]["byte_end"] <= int(start) < last and int(number) in arms]  # fmt: skip
             refused.update(hit)
             if (error["code"] or {}).get("code") in REFUSED:
                 impossible.update(hit)
