@@ -170,6 +170,46 @@ fn whole_segments_are_as_their_pixels() {
     }
 }
 
+/// Where the raw picture ends within a segment, its pixels are told one by one, at all four edges.
+#[test]
+fn segments_at_the_edges_are_as_their_pixels() {
+    let mut random = Random::seeded("edges", SEED);
+    let pixels = noise(&mut random, 70 * 48);
+    let picture = Picture::new(&pixels, 64, 48, 70).unwrap();
+    let source = Source::new(&picture, (64, 48));
+    let ideal = CameraModel { width: 64, height: 48, cx: 31.5, cy: 23.5, fx: 300.0, fy: 300.0, ..camera([0.0; 8]) };
+    let rotation = turned([0.0; 3]);
+    for round in 0..60 {
+        let moved = [0, 1].map(|_| random.within_f32(-12.0, 30.0));
+        let focal_px = [300.0, 297.0, 330.0, 200.0][round % 4];
+        let pair = RectifiedPair { focal_px, cx: 31.5 + moved[0], cy: 23.5 + moved[1], ..plain(96, 72) };
+        let rectification = Some(Rectification { left_rotation: rotation, right_rotation: rotation, pair });
+        let translation_m = [-0.1, 0.0, 0.0];
+        let raw = RawPair { left: ideal, right: ideal, rotation, translation_m, rectification };
+        let rectifier = rectifier(&StereoCalibration::Raw(raw));
+        let mut out = [9; 96];
+        for y in 0..72 {
+            let span = rectifier.row(Side::Left, &picture, y, &mut out);
+            let segments: Vec<_> = rectifier.left.grid.segments(y).collect();
+            let expected = (0..96).map(|x| {
+                let segment = segments[x / STEP].unwrap();
+                source.at([0, 1].map(|i| segment.start[i] + segment.slope[i] * (x % STEP) as i32 + HALF_WEIGHT))
+            });
+            let expected: Vec<Option<u8>> = expected.collect();
+            // One picture without holes: what is valid hangs together.
+            let valid = expected.iter().filter(|value| value.is_some()).count();
+            assert_eq!(span.len(), valid, "round {round}, row {y}: {span:?}");
+            for (x, value) in expected.into_iter().enumerate() {
+                assert_eq!(
+                    (out[x], span.contains(&x)),
+                    (value.unwrap_or(0), value.is_some()),
+                    "round {round}: {x}, {y}"
+                );
+            }
+        }
+    }
+}
+
 /// The same bits on every processor: FNV-1a over both rectified pictures and the chosen cameras.
 #[test]
 fn the_bits_are_the_same_everywhere() {
