@@ -71,6 +71,7 @@ def main(results, path, *modules):
         needless = expected - (survivors if tested == len(chosen) else Counter(map(without_place, there)))
         failures += [f"argued, but no such mutant survives: {text} ({number})" for text, number in sorted(needless.items())]
     print(" | ".join(("all", *(str(total[name]) for name in columns))))
+    print(f"of {every} mutants of all modules; {listed.total()} of them are argued, {MOST_ARGUED * every:.0f} may be")
     if listed.total() > MOST_ARGUED * every:
         failures.append(f"{listed.total()} mutants are argued, more than {MOST_ARGUED:.0%} of {every}")
     for failure in failures:

@@ -3,7 +3,7 @@
 use std::{boxed::Box, vec, vec::Vec};
 
 use super::*;
-use crate::{matching::MatchSettings, test_random::Random};
+use crate::{bands::cut, matching::MatchSettings, test_random::Random};
 
 const WIDTH: usize = 256;
 const HEIGHT: usize = 192;
@@ -55,30 +55,76 @@ impl Scene {
 struct Eye {
     content: Box<Content<WIDTH>>,
     matcher: Box<Matcher<WIDTH, DISPARITIES>>,
+    /// What looks at bands, with what it saw last.
+    bands: Vec<(RowLooks<WIDTH>, Ordinals)>,
 }
+
+const RANGE: SearchRange = SearchRange { first: 0, last: DISPARITIES - 1 };
+const WHOLE: ValidSpan = ValidSpan { start: 0, end: WIDTH as u16 };
 
 impl Eye {
     fn new() -> Self {
+        Self::with(MatchSettings::DEFAULT)
+    }
+
+    fn with(settings: MatchSettings) -> Self {
         let mut matcher = Box::new(Matcher::new());
-        let settings = MatchSettings { disparities: DISPARITIES as u16, ..MatchSettings::DEFAULT };
+        let settings = MatchSettings { disparities: DISPARITIES as u16, ..settings };
         matcher.configure(&settings, WIDTH, HEIGHT).unwrap();
-        Self { content: Box::new(Content::new()), matcher }
+        let bands = (0..5).map(|_| (RowLooks::new(), Ordinals::new())).collect();
+        Self { content: Box::new(Content::new()), matcher, bands }
     }
 
     fn look(&mut self, left: &[u8], right: &[u8]) -> ContentSigns {
         let mut disparity = vec![DisparityPixel::default(); WIDTH * HEIGHT];
         self.matcher.begin();
-        self.content.begin(WIDTH, HEIGHT, SearchRange { first: 0, last: DISPARITIES - 1 });
-        let whole = ValidSpan { start: 0, end: WIDTH as u16 };
+        self.content.begin(WIDTH, HEIGHT, RANGE);
         let mut next = 0;
         for (y, (left, right)) in left.chunks(WIDTH).zip(right.chunks(WIDTH)).enumerate() {
-            self.matcher.push(left, right, whole, whole);
+            self.matcher.push(left, right, WHOLE, WHOLE);
             while disparity.get_mut(next * WIDTH..(next + 1) * WIDTH).is_some_and(|row| self.matcher.pull(next, row)) {
                 next += 1;
             }
-            self.content.push(y, [left, right], [whole; 2]);
+            self.content.push(y, [left, right], [WHOLE; 2]);
             self.content.look(&self.matcher, &disparity, WIDTH, next);
         }
+        self.content.signs(3.0)
+    }
+
+    /// The same in bands, each with a matcher of its own that sees the rows around as well.
+    fn look_in_bands(&mut self, left: &[u8], right: &[u8], count: usize) -> ContentSigns {
+        self.content.begin(WIDTH, HEIGHT, RANGE);
+        let settings = *self.matcher.settings();
+        for (number, rows) in cut(HEIGHT, count, unit_of_bands(HEIGHT)).enumerate() {
+            let [above, below] =
+                rows_around(HEIGHT, &rows, settings.reach()).map(|around| around.max(settings.margins()[1]));
+            let seen = rows.start.saturating_sub(above)..(rows.end + below).min(HEIGHT);
+            let mut matcher = Box::new(Matcher::<WIDTH, DISPARITIES>::new());
+            matcher.configure_as(&self.matcher);
+            matcher.set_height(seen.len());
+            matcher.begin();
+            let (looks, ordinals) = &mut self.bands[number];
+            looks.begin_band(&self.content.looks, WIDTH, rows.start);
+            ordinals.clear();
+            let mut disparity = vec![DisparityPixel::default(); WIDTH * rows.len()];
+            let mut next = 0;
+            for y in seen.clone() {
+                let [left, right] = [left, right].map(|picture| &picture[y * WIDTH..(y + 1) * WIDTH]);
+                matcher.push(left, right, WHOLE, WHOLE);
+                let row = |next: usize| next * WIDTH..(next + 1) * WIDTH;
+                let mut pulled =
+                    |next: usize, out: &mut [DisparityPixel]| matcher.pull(rows.start - seen.start + next, out);
+                while disparity.get_mut(row(next)).is_some_and(|out| pulled(next, out)) {
+                    next += 1;
+                }
+                if rows.contains(&y) {
+                    looks.push(y, [left, right], [WHOLE; 2]);
+                }
+                let (of_matcher, done) = ((&*matcher, seen.start), rows.start + next);
+                looks.look(of_matcher, (&disparity, rows.start), WIDTH, done, Some(&mut *ordinals));
+            }
+        }
+        self.bands[..count].iter().for_each(|(looks, ordinals)| self.content.looks.append(looks, ordinals));
         self.content.signs(3.0)
     }
 }
@@ -181,4 +227,81 @@ fn while_nothing_moves_no_picture_is_late() {
         let sign = eye.look(&left, &right).pairing;
         assert!(sign.advantage_sigmas < 2.0, "frame {frame}: {sign:?}");
     }
+}
+
+#[test]
+fn bands_say_what_the_whole_picture_says() {
+    let (scene, mut random) = (Scene::new(0x5eed_0188), Random::seeded("noise", 0x5eed_0189));
+    let mut pair = |moved: fn(f64, f64) -> (f64, f64), flat: usize| {
+        let left = scene.see(&mut random, |u, v| (u, v));
+        let mut right = scene.see(&mut random, |u, v| moved(u + 12.0, v));
+        right.iter_mut().enumerate().filter(|(i, _)| i % WIDTH < flat).for_each(|(_, grey)| *grey = 100);
+        (left, right)
+    };
+    // In line; partly covered; out of line, so that nearly every place is searched for; so in the lower part alone; near there; and
+    // nothing that fits at all.
+    let pairs = [
+        pair(|x, y| (x, y), 0),
+        pair(|x, y| (x, y), 100),
+        pair(|x, y| (x, y - 3.0), 0),
+        pair(|x, y| (x, if y > 80.0 { y - 2.5 } else { y }), 0),
+        pair(|x, y| (if y > 100.0 { x + 40.0 } else { x }, y), 0),
+        pair(|x, y| (y * 3.0, x), 0),
+    ];
+    let mut alone = Eye::new();
+    let mut eyes = [1, 2, 3, 4, 5].map(|count| (count, Eye::new()));
+    let mut signs = Vec::new();
+    for (left, right) in &pairs {
+        let expected = alone.look(left, right);
+        for (count, eye) in &mut eyes {
+            assert_eq!(eye.look_in_bands(left, right, *count), expected, "{count} bands");
+        }
+        signs.push(expected);
+    }
+    assert!(
+        signs[2].rows.error_px > 2.5 && signs[3].rows.error_px > 0.5 && signs[4].rows.near_percent > 30.0,
+        "{signs:?}"
+    );
+    assert!(signs[1].coverings[1].covered > 3, "{signs:?}");
+}
+
+#[test]
+fn bands_see_blocks_rows_of_profiles_and_what_strips_need_whole() {
+    for height in 1..3000 {
+        let (unit, rows) = (unit_of_bands(height), height.div_ceil(256));
+        assert!(unit > 0 && unit.is_multiple_of(BLOCK) && unit.is_multiple_of(rows), "{height}: {unit}");
+        assert!((1..unit).all(|less| !less.is_multiple_of(BLOCK) || !less.is_multiple_of(rows)), "{height}: {unit}");
+    }
+    for (height, count, reach) in [(192, 3, 1), (240, 4, 2), (480, 5, 2), (64, 2, 1), (33, 3, 2), (1080, 8, 1)] {
+        for band in cut(height, count, BLOCK).filter(|band| !band.is_empty()) {
+            let strips = (1..=16).map(|strip| height * strip / 17).filter(|y| band.contains(y));
+            // Three rows of a patch, four rows that are searched.
+            let [mut above, mut below] = [0, 0];
+            for y in strips {
+                above = above.max((band.start + 7 + reach).saturating_sub(y));
+                below = below.max((y + 7 + reach + 1).saturating_sub(band.end));
+            }
+            assert_eq!(rows_around(height, &band, reach), [above, below], "{height} rows, {band:?}");
+        }
+    }
+}
+
+#[test]
+fn a_place_is_looked_at_when_its_disparity_is_known() {
+    // A high window says disparities some rows after the last row that the look needs; without them most places were searched for.
+    let (left, right) = wall(0x5eed_018a, |x, y| (x, y));
+    for window_height in [5, 13, 21] {
+        let signs = Eye::with(MatchSettings { window_height, ..MatchSettings::DEFAULT }).look(&left, &right).rows;
+        assert!(signs.matches > 90, "{window_height} rows: {signs:?}");
+    }
+}
+
+#[test]
+fn what_was_cleared_is_no_moment_to_compare_with() {
+    let [first, second] = [0x5eed_018b, 0x5eed_018d].map(|seed| wall(seed, |x, y| (x, y)));
+    let mut eye = Eye::new();
+    assert_eq!(eye.look(&first.0, &first.1).pairing, PairingSign::default());
+    assert_ne!(eye.look(&second.0, &second.1).pairing, PairingSign::default());
+    eye.content.clear();
+    assert_eq!(eye.look(&first.0, &first.1).pairing, PairingSign::default());
 }

@@ -38,6 +38,11 @@ fn estimates_are_told_when_found_twice_and_all_until_gone_for_long_enough() {
         told(SOFT, 2, 2, &[Degraded, Degraded, Blind, Degraded, Degraded, Ok, Ok]),
         [Ok, Degraded, Blind, Blind, Degraded, Degraded, Ok]
     );
+    assert_eq!(
+        told(SOFT, 2, 3, &[Degraded, Degraded, Ok, Blind]),
+        [Ok, Degraded, Degraded, Blind],
+        "worse after a pause"
+    );
     assert_eq!(told(SOFT, 0, 0, &[Blind, Ok]), [Blind, Ok], "zero counts as one");
 }
 

@@ -110,3 +110,7 @@ impl Pairing {
 fn fisher(correlation: f32) -> f32 {
     libm::atanhf(correlation.clamp(-MOST_ALIKE, MOST_ALIKE))
 }
+
+#[cfg(test)]
+#[path = "pairing_tests.rs"]
+mod tests;

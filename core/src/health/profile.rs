@@ -152,3 +152,7 @@ impl Signature {
         ab as f32 / libm::sqrtf(aa as f32 * bb as f32)
     }
 }
+
+#[cfg(test)]
+#[path = "profile_tests.rs"]
+mod tests;

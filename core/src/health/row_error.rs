@@ -398,24 +398,5 @@ fn costs(strip: &Strip<'_, { 2 * MARGIN + 1 }>, x: usize, there: usize, down: us
 }
 
 #[cfg(test)]
-mod tests {
-    extern crate std;
-    use std::vec::Vec;
-
-    use super::*;
-    use crate::test_random::Random;
-
-    #[test]
-    fn the_middle_is_that_of_the_sorted_numbers() {
-        let mut random = Random::seeded("middle of the row errors", 7);
-        for len in 1..200 {
-            let errors = (0..len).map(|_| random.next() as i16 >> (len % 12)).collect::<Vec<i16>>();
-            let errors: Vec<_> = errors.into_iter().filter(|error| *error != i16::MIN).collect();
-            let mut sorted: Vec<_> = errors.iter().map(|error| error.abs()).collect();
-            sorted.sort_unstable();
-            if let Some(&expected) = sorted.get(sorted.len() / 2) {
-                assert_eq!(middle_of(&errors), expected, "{errors:?}");
-            }
-        }
-    }
-}
+#[path = "row_error_tests.rs"]
+mod tests;

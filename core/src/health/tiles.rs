@@ -174,3 +174,7 @@ impl<const WIDTH: usize> Tiles<WIDTH> {
         covering
     }
 }
+
+#[cfg(test)]
+#[path = "tiles_tests.rs"]
+mod tests;

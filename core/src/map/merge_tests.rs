@@ -27,7 +27,8 @@ fn random_map(random: &mut Random) -> Box<ObstacleMap<CELLS>> {
     for _ in 0..GEOMETRY.len() {
         let pixels = random.below(65_536) as u16;
         let (confidence_percent, doubt) =
-            [(100, Doubt::None), (80, Doubt::Unconfirmed), (50, Doubt::Disputed)][random.below(3) as usize];
+            [(100, Doubt::None), (80, Doubt::Unconfirmed), (80, Doubt::Disputed), (50, Doubt::Disputed)]
+                [random.below(4) as usize];
         let known = Cell { pixels, confidence_percent, doubt, ..Cell::default() };
         let (height_dm, cost) = (random.below(256) as u8, random.below(65_536) as u16);
         let cell = match random.below(3) {
@@ -86,7 +87,9 @@ fn every_cell_follows_the_rules_in_any_order() {
                 assert_eq!(Some(cell.pixels), of(CellState::Obstacle).map(|(_, c)| c.pixels).max());
                 assert_eq!(Some(cell.height_dm), of(CellState::Obstacle).map(|(_, c)| c.height_dm).max());
                 assert_eq!(Some(cell.cost), of(CellState::Obstacle).map(|(_, c)| c.cost).max());
-                let surest = of(CellState::Obstacle).map(|(_, c)| (c.confidence_percent, c.doubt)).max_by_key(|c| c.0);
+                // Of the surest the one that is doubted least.
+                let surest = of(CellState::Obstacle).map(|(_, c)| (c.confidence_percent, c.doubt));
+                let surest = surest.max_by_key(|(confidence, doubt)| (*confidence, core::cmp::Reverse(*doubt)));
                 assert_eq!(Some((cell.confidence_percent, cell.doubt)), surest);
             } else if of(CellState::Unknown(UnknownReason::Disputed)).count() > 0 {
                 // Nobody's free counts where another pair's detectors disagree.
@@ -151,6 +154,8 @@ fn the_ground_with_the_most_support_is_told() {
         ([Some(plane(10, 0)), Some(plane(500, 1)), None], Some(plane(10, 0))),
         ([Some(plane(500, 3)), Some(plane(10, 0)), Some(plane(400, 1))], Some(plane(10, 0))),
         ([None, Some(plane(10, 2)), Some(plane(11, 4))], Some(plane(11, 4))),
+        // Of equals the first.
+        ([Some(plane(10, 1)), Some(plane(10, 2)), None], Some(plane(10, 1))),
         ([None, None, None], None),
     ] {
         let mut merged = Box::new(Merged::new());
@@ -175,4 +180,23 @@ fn maps_of_other_cells_are_refused_whole() {
     found.clear();
     found.add_parts(&other, None, Health::OK).unwrap();
     assert_eq!((found.map().geometry, &found.map().cells), (other.geometry, &other.cells));
+}
+
+#[test]
+fn a_detection_is_added_with_its_map_its_ground_and_its_health_and_free_cells_are_withheld_on_demand() {
+    let mut random = Random::seeded("a detection", 0x5eed_0163);
+    let frame = crate::geometry::VehicleFrame::new(&crate::geometry::Mount::default()).unwrap();
+    let mut detection = Box::new(Detection::<4, CELLS>::new());
+    detection.map.clone_from(&random_map(&mut random));
+    detection.ground = Some(GroundPlane::of_mount(&frame));
+    detection.health = at(HealthLevel::Degraded, 5);
+    let mut merged = Box::new(Merged::new());
+    merged.add(&detection).unwrap();
+    assert_eq!((&merged.map().cells, merged.ground()), (&detection.map.cells, detection.ground.as_ref()));
+    assert_eq!(merged.health(), detection.health);
+    merged.withhold_free();
+    for (cell, was) in merged.map().cells.iter().zip(&detection.map.cells) {
+        let not_trusted = Cell { state: CellState::Unknown(UnknownReason::NotTrusted), ..Cell::default() };
+        assert_eq!(*cell, if was.state == CellState::Free { not_trusted } else { *was });
+    }
 }

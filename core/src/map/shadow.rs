@@ -62,3 +62,23 @@ fn direction(y: f32, x: f32) -> usize {
     let place = (tangent + REACH) * (DIRECTIONS as f32 / (2.0 * REACH));
     (place as usize).min(DIRECTIONS - 1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_rise_from_right_to_left_and_none_is_beyond_the_last() {
+        for x in [0.1_f32, 0.7, 1.0, 3.3, 29.0] {
+            let edge = REACH * x;
+            for y in [edge.next_down(), edge, 10.0 * edge, f32::INFINITY] {
+                assert_eq!((direction(y, x), direction(-y, x)), (DIRECTIONS - 1, 0), "{y} at {x}");
+            }
+            for step in 0..DIRECTIONS {
+                // In the middle of the direction.
+                let tangent = (step as f32 + 0.5) / 32.0 - 2.0;
+                assert_eq!(direction(tangent * x, x), step);
+            }
+        }
+    }
+}

@@ -5,7 +5,7 @@ use std::vec::Vec;
 use super::take_out;
 use crate::{
     geometry::{Mount, Place},
-    map::{Cell, CellState, MapGeometry, MapSettings, ObstacleMap},
+    map::{Cell, CellState, MapGeometry, MapSettings, ObstacleMap, UnknownReason},
 };
 
 const GEOMETRY: MapGeometry = MapGeometry { cell_size_mm: 500, x_first: 0, x_count: 40, y_first: -20, y_count: 40 };
@@ -64,4 +64,18 @@ fn a_thing_on_the_border_of_two_cells_smears_with_the_pixels_of_both() {
     };
     assert!(stays(200, 0) && stays(0, 200), "either by itself is too little");
     assert!(!stays(200, 200), "both together are enough");
+}
+
+#[test]
+fn a_smeared_cell_is_hidden_and_keeps_its_cost_and_nothing_smears_nothing() {
+    let mut map = unknown();
+    for (i, pixels) in [(10, 400), (11, 20), (30, 0)] {
+        let cell = Cell { state: CellState::Obstacle, pixels, cost: 7, height_dm: 3, ..Cell::default() };
+        map.cells[GEOMETRY.index(i, 0).unwrap()] = cell;
+    }
+    take_out(&mut map, &Place::ORIGIN, &MapSettings::default());
+    let at = |i: i16| map.cells[GEOMETRY.index(i, 0).unwrap()];
+    assert_eq!(at(11), Cell { state: CellState::Unknown(UnknownReason::Hidden), cost: 7, ..Cell::default() });
+    // What was unclear alone may have made an obstacle without a pixel of one.
+    assert_eq!(at(30).state, CellState::Obstacle);
 }

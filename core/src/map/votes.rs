@@ -313,3 +313,7 @@ impl<const PIXELS: usize, const SURFACES: usize, const DISPARITIES: usize> Colle
 fn group<T>(values: &[T; TILE], first: usize) -> Option<&[T; LANES]> {
     values.get(first..).and_then(|rest| rest.first_chunk())
 }
+
+#[cfg(test)]
+#[path = "votes_tests.rs"]
+mod tests;

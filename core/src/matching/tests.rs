@@ -6,6 +6,7 @@ use super::*;
 use crate::test_random::Random;
 
 mod backends;
+mod parts;
 
 const WIDTH: usize = 112;
 const DISPARITIES: usize = 32;

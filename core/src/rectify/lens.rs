@@ -130,3 +130,7 @@ impl Lens {
         })
     }
 }
+
+#[cfg(test)]
+#[path = "lens_tests.rs"]
+mod tests;

@@ -76,7 +76,8 @@ impl TileUnion {
     /// step and the least number of pixels count here.
     ///
     /// If `CODED`, `labels` holds a class below [`CODES`] for each pixel: only pixels of one class make a surface, and the class
-    /// is left beside the number, [`CODE_SHIFT`] bits up.
+    /// is left beside the number, [`CODE_SHIFT`] bits up. There is one number less then: the last surface of a tile that is full of
+    /// the smallest is counted and gets none.
     ///
     /// # Bound
     /// Two passes over the tile, and three over its runs.
@@ -105,7 +106,7 @@ impl TileUnion {
         }
         // The count of a surface makes room for its number as soon as the number is known.
         let most = if CODED { usize::from(NUMBER_MASK) } else { MAX_SURFACES };
-        let mut found = 0u8;
+        let (mut found, mut lost) = (0u8, 0u8);
         let mut run = 0usize;
         for (y, links) in rows.iter().enumerate().take(tile.height) {
             let Some(labels) = labels.get_mut(tile.row(y, stride)) else { break };
@@ -116,7 +117,11 @@ impl TileUnion {
                 run = run.wrapping_add(1);
                 let pixels = &mut self.pixels[root];
                 if *pixels & NUMBERED == 0 {
-                    let enough = *pixels >= settings.min_pixels && usize::from(found) < most;
+                    let large = *pixels >= settings.min_pixels;
+                    let enough = large && usize::from(found) < most;
+                    if CODED {
+                        lost = lost.wrapping_add(u8::from(large && !enough));
+                    }
                     found = found.wrapping_add(u8::from(enough));
                     *pixels = NUMBERED | if enough { u16::from(found) } else { 0 };
                 }
@@ -137,7 +142,7 @@ impl TileUnion {
                 labels.iter_mut().zip(numbers).for_each(|(label, number)| *label = number);
             }
         }
-        found
+        found.wrapping_add(lost)
     }
 
     /// Finds the runs of the tile, counts their pixels and joins those that touch; returns how the pixels of each row hang together,

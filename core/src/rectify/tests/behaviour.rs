@@ -73,6 +73,26 @@ fn rectified_pictures_pass_through() {
     assert_eq!(rectifier.row(Side::Left, &small, 10, &mut out), 0..0);
 }
 
+#[test]
+fn pictures_have_the_size_that_their_calibration_says_and_no_row_below_it() {
+    let passed = rectifier(&StereoCalibration::Rectified(plain(64, 48)));
+    assert_eq!([Side::Left, Side::Right].map(|side| passed.raw_size(side)), [(64, 48); 2]);
+    let mut raw = made_up()[0].1;
+    raw.right = CameraModel { width: 500, height: 400, ..raw.right };
+    let rotation = turned([0.0; 3]);
+    let pair = RectifiedPair { cx: 100.0, cy: 100.0, ..plain(64, 48) };
+    raw.rectification = Some(Rectification { left_rotation: rotation, right_rotation: rotation, pair });
+    let rectifier = rectifier(&StereoCalibration::Raw(raw));
+    assert_eq!([Side::Left, Side::Right].map(|side| rectifier.raw_size(side)), [(512, 384), (500, 400)]);
+    let white = vec![255; 512 * 384];
+    let picture = Picture::packed(&white, 512, 384).unwrap();
+    let mut out = [9; 70];
+    assert_eq!(rectifier.row(Side::Left, &picture, 47, &mut out), 0..64);
+    // The map reaches a little farther.
+    assert_eq!(rectifier.row(Side::Left, &picture, 48, &mut out), 0..0);
+    assert_eq!(out, [0; 70]);
+}
+
 /// Where raw and rectified camera are the same, every pixel keeps its value, those of the last row and column too.
 #[test]
 fn the_same_camera_gives_the_same_picture() {
@@ -145,6 +165,46 @@ fn whole_segments_are_as_their_pixels() {
                 let segment = segments[x / STEP].unwrap();
                 let place = [0, 1].map(|i| segment.start[i] + segment.slope[i] * (x % STEP) as i32 + HALF_WEIGHT);
                 assert_eq!(Some(out[x]), source.at(place), "{name} ({x}, {y})");
+            }
+        }
+    }
+}
+
+/// Where the raw picture ends within a segment, its pixels are told one by one, at all four edges.
+#[test]
+fn segments_at_the_edges_are_as_their_pixels() {
+    let mut random = Random::seeded("edges", SEED);
+    let pixels = noise(&mut random, 70 * 48);
+    let picture = Picture::new(&pixels, 64, 48, 70).unwrap();
+    let source = Source::new(&picture, (64, 48));
+    let ideal = CameraModel { width: 64, height: 48, cx: 31.5, cy: 23.5, fx: 300.0, fy: 300.0, ..camera([0.0; 8]) };
+    let rotation = turned([0.0; 3]);
+    for round in 0..60 {
+        let moved = [0, 1].map(|_| random.within_f32(-12.0, 30.0));
+        let focal_px = [300.0, 297.0, 330.0, 200.0][round % 4];
+        let pair = RectifiedPair { focal_px, cx: 31.5 + moved[0], cy: 23.5 + moved[1], ..plain(96, 72) };
+        let rectification = Some(Rectification { left_rotation: rotation, right_rotation: rotation, pair });
+        let translation_m = [-0.1, 0.0, 0.0];
+        let raw = RawPair { left: ideal, right: ideal, rotation, translation_m, rectification };
+        let rectifier = rectifier(&StereoCalibration::Raw(raw));
+        let mut out = [9; 96];
+        for y in 0..72 {
+            let span = rectifier.row(Side::Left, &picture, y, &mut out);
+            let segments: Vec<_> = rectifier.left.grid.segments(y).collect();
+            let expected = (0..96).map(|x| {
+                let segment = segments[x / STEP].unwrap();
+                source.at([0, 1].map(|i| segment.start[i] + segment.slope[i] * (x % STEP) as i32 + HALF_WEIGHT))
+            });
+            let expected: Vec<Option<u8>> = expected.collect();
+            // One picture without holes: what is valid hangs together.
+            let valid = expected.iter().filter(|value| value.is_some()).count();
+            assert_eq!(span.len(), valid, "round {round}, row {y}: {span:?}");
+            for (x, value) in expected.into_iter().enumerate() {
+                assert_eq!(
+                    (out[x], span.contains(&x)),
+                    (value.unwrap_or(0), value.is_some()),
+                    "round {round}: {x}, {y}"
+                );
             }
         }
     }
