@@ -10,8 +10,12 @@ use crate::{
     instructions::SIZE,
 };
 
-/// Least share of its bound that each stage was seen to take, percent: below it the bound would say little.
-const LEAST_PERCENT: u64 = 35;
+/// Least share of its bound that a stage was seen to take, percent: below it the bound would say little. Of two stages no picture is
+/// known that comes as near: the sparse matches of the health and the strips that it matches do not want the same pictures, and neither
+/// do the many planes of surfaces and their many runs.
+fn least_percent(stage: &str) -> u64 {
+    if ["health", "surfaces"].contains(&stage) { 50 } else { 70 }
+}
 
 /// The stages: what was seen of each, and its bound.
 pub(crate) struct Taken {
@@ -57,8 +61,9 @@ impl Taken {
     fn bad(&self) -> impl Iterator<Item = String> {
         self.rows.iter().filter_map(|(stage, taken, bound)| match bound {
             Some(bound) if taken > bound => Some(format!("{stage}: {taken} were taken, the bound is {bound}")),
-            Some(bound) if 100 * taken < LEAST_PERCENT * bound => {
-                Some(format!("{stage}: the worst that is known takes less than {LEAST_PERCENT} % of the bound {bound}"))
+            Some(bound) if 100 * taken < least_percent(stage) * bound => {
+                let least = least_percent(stage);
+                Some(format!("{stage}: the worst that is known takes less than {least} % of the bound {bound}"))
             }
             _ => None,
         })
@@ -91,11 +96,11 @@ mod tests {
 
     #[test]
     fn the_most_of_each_stage_is_held_against_its_bound() {
-        assert!(taken("taken map 400\ntaken map 1000\ntaken health 7\ndone\n").is_good());
+        assert!(taken("taken map 700\ntaken map 1000\ntaken health 7\ndone\n").is_good());
         assert!(!taken("done\n").is_good());
         let told = |text: &str| taken(text).bad().collect::<Vec<_>>();
         assert_eq!(told("taken map 1001\ntaken map 5"), ["map: 1001 were taken, the bound is 1000"]);
-        assert_eq!(told("taken map 349"), ["map: the worst that is known takes less than 35 % of the bound 1000"]);
+        assert_eq!(told("taken map 699"), ["map: the worst that is known takes less than 70 % of the bound 1000"]);
     }
 
     #[test]
