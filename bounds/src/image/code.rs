@@ -122,7 +122,7 @@ impl Code {
 pub(crate) fn argument(code: &[&Instruction], nth: u16) -> Option<u32> {
     let register = ArmReg::ARM_REG_R0 as u16 + nth;
     let is_call = |one: &&Instruction| matches!(one.mnemonic.as_str(), "bl" | "b" | "b.w");
-    let before = &code[..code.iter().rposition(|one| is_call(one))?];
+    let before = &code[..code.iter().rposition(is_call)?];
     // Whatever else names the register may write it.
     let names = |one: &&&Instruction| (0..one.operands.len()).any(|i| one.register(i) == Some(register));
     let last = before.iter().rev().find(names)?;

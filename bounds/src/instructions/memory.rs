@@ -99,7 +99,8 @@ pub(super) fn behind_words(
 
 /// Words that copies, or fills, go through for their calls: those that the code of a call says, or as many as `most` says of one.
 pub(super) fn words_of_calls(
-    (name, length): (&dyn Fn(u32) -> String, &dyn Fn(Count, u16) -> Option<u32>),
+    name: &dyn Fn(u32) -> String,
+    length: &dyn Fn(Count, u16) -> Option<u32>,
     calls: &BTreeMap<u32, Vec<Count>>,
     is_copied: bool,
     most: u64,
@@ -155,11 +156,11 @@ mod tests {
     #[test]
     fn a_call_takes_the_words_that_its_code_says() {
         let name = |at: u32| ["__aeabi_memclr4", MEMCPY, "__aeabi_memcpy", "core"][at as usize / 10].to_owned();
-        let length = |call, nth| (call == Count::Block(30, nth.into())).then_some(70);
+        let length = |call, nth: u16| (call == Count::Block(30, nth.into())).then_some(70);
         let [cleared, copied, unknown, wrapped] =
             [(30, 1), (30, 2), (30, 3), (20, 0)].map(|(at, place)| Count::Block(at, place));
         let calls = BTreeMap::from([(0, vec![cleared]), (10, vec![wrapped, copied]), (20, vec![unknown])]);
-        let of = |is_copied| words_of_calls((&name, &length), &calls, is_copied, 32);
+        let of = |is_copied| words_of_calls(&name, &length, &calls, is_copied, 32);
         assert_eq!(of(true), [(copied, 17.0), (unknown, 32.0)]);
         assert_eq!(of(false), [(cleared, 17.0)]);
     }

@@ -166,7 +166,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
         Count::Way(..) => None,
     };
     for (group, (mut sum, most, beside)) in by_words {
-        let words = memory::words_of_calls((&name, &length), &calls, group == "copied", most);
+        let words = memory::words_of_calls(&name, &length, &calls, group == "copied", most);
         sum.extend(words.into_iter().map(|(call, words)| (call, -words)));
         program.limit(sum, beside);
     }
