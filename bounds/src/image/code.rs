@@ -121,11 +121,15 @@ impl Code {
 /// The number that argument `nth` of the only call in a piece of code is: what last goes into its register, if that is a number.
 pub(crate) fn argument(code: &[&Instruction], nth: u16) -> Option<u32> {
     let register = ArmReg::ARM_REG_R0 as u16 + nth;
-    let is_call = |one: &&Instruction| matches!(one.mnemonic.as_str(), "bl" | "b" | "b.w");
-    let before = &code[..code.iter().rposition(is_call)?];
+    let is_call = |one: &&Instruction| one.mnemonic == "bl";
+    // Without one it ends in a jump to a function; with more there is no telling which is meant.
+    let call = code.iter().position(is_call).unwrap_or(code.len().checked_sub(1)?);
+    if code.iter().skip(call + 1).any(is_call) {
+        return None;
+    }
     // Whatever else names the register may write it.
     let names = |one: &&&Instruction| (0..one.operands.len()).any(|i| one.register(i) == Some(register));
-    let last = before.iter().rev().find(names)?;
+    let last = code[..call].iter().rev().find(names)?;
     let is_move = ["mov", "movs", "mov.w", "movw"].contains(&last.mnemonic.as_str());
     let number = last.immediate(1).filter(|_| is_move && !last.is_conditional() && last.register(0) == Some(register));
     u32::try_from(number?).ok()
@@ -206,5 +210,39 @@ impl Instruction {
     /// Whether the instruction runs when the first one after its IT does.
     pub(crate) fn is_then(&self, first: Option<&Self>) -> bool {
         first.is_none_or(|first| first.condition == self.condition)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The number that the third argument of a call in some Thumb code is.
+    fn third(code: &[u16]) -> Option<u32> {
+        let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
+        let marks = BTreeMap::from([(0x100, Kind::Thumb)]);
+        let code = Code::disassemble(&[(0x100, &bytes)], &marks).unwrap();
+        argument(&code.instructions.values().collect::<Vec<_>>(), 2)
+    }
+
+    #[test]
+    fn an_argument_is_what_last_went_into_its_register() {
+        const MOVS_R2_64: u16 = 0x2240;
+        const MOVS_R2_4: u16 = 0x2204;
+        const MOV_R2_R4: u16 = 0x4622;
+        const LDR_R2_FROM_SP: u16 = 0x9a00;
+        const B: u16 = 0xe7fe;
+        const BL: [u16; 2] = [0xf000, 0xf800];
+        let code = |before: &[u16], behind: &[u16]| [before, &BL, behind].concat();
+        assert_eq!(third(&code(&[MOVS_R2_4, MOVS_R2_64], &[])), Some(64));
+        // What comes behind the call is of another.
+        assert_eq!(third(&code(&[MOVS_R2_64], &[MOVS_R2_4, B])), Some(64));
+        assert_eq!(third(&[MOVS_R2_64, B]), Some(64));
+        assert_eq!(third(&code(&[MOVS_R2_64, MOV_R2_R4], &[])), None);
+        assert_eq!(third(&code(&[MOVS_R2_64, LDR_R2_FROM_SP], &[])), None);
+        assert_eq!(third(&code(&[], &[MOVS_R2_64])), None);
+        assert_eq!(third(&code(&[MOVS_R2_64], &BL)), None);
+        // If equal, or not: `it eq; moveq r2, #4`.
+        assert_eq!(third(&code(&[0xbf08, MOVS_R2_4], &[])), None);
     }
 }
