@@ -128,7 +128,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
         }
         for (number, fact) in stage.facts.iter().enumerate() {
             let facts::At::Code(file, text) = fact.at else { continue };
-            let of_line: Vec<bool> = graph.blocks.iter().map(|block| is_all_of(image, block, file, text)).collect();
+            let of_line: Vec<_> = graph.blocks.iter().map(|block| is_all_of(image, block, file, text)).collect();
             for block in outside_loops(&of_line, &found) {
                 program.limit(vec![(Count::Block(at, block), 1.0)], fact.most.more);
                 used.insert(number);
@@ -255,17 +255,22 @@ impl Chain {
     }
 }
 
-/// Whether all of a block that is known of a line is of this one, or was inlined there.
-fn is_all_of(image: &Image, block: &Block, file: &str, text: &str) -> bool {
+/// Whether all of a block that is known of a line is of this one, or was inlined there; `None` if nothing is known of it.
+fn is_all_of(image: &Image, block: &Block, file: &str, text: &str) -> Option<bool> {
     let chains = block.instructions.iter().map(|&address| Chain::of(image, address));
     let mut known = chains.filter(|chain| !chain.0.is_empty()).peekable();
-    known.peek().is_some() && known.all(|chain| chain.is_inlined_at(file, text))
+    known.peek()?;
+    Some(known.all(|chain| chain.is_inlined_at(file, text)))
 }
 
-/// Blocks of a line that run as often as the line: those in a loop that is of the line as well may run more often.
-fn outside_loops(of_line: &[bool], loops: &[Loop]) -> Vec<usize> {
-    let inner: Vec<&Loop> = loops.iter().filter(|one| of_line[one.head]).collect();
-    let is_outside = |block: &usize| of_line[*block] && !inner.iter().any(|one| one.blocks.contains(block));
+/// Blocks of a line that run as often as the line: those in a loop that is of the line as well may run more often. So may those in a
+/// loop of which nothing is known to be of another line, whatever its head is.
+fn outside_loops(of_line: &[Option<bool>], loops: &[Loop]) -> Vec<usize> {
+    let may_be_inner =
+        |one: &&Loop| of_line[one.head] == Some(true) || one.blocks.iter().all(|block| of_line[*block] != Some(false));
+    let inner: Vec<&Loop> = loops.iter().filter(may_be_inner).collect();
+    let is_outside =
+        |block: &usize| of_line[*block] == Some(true) && !inner.iter().any(|one| one.blocks.contains(block));
     (0..of_line.len()).filter(is_outside).collect()
 }
 
@@ -352,8 +357,11 @@ mod tests {
         // Block 0 comes before a loop of 1 to 6, in which the line is 2 to 5; of them 3 and 4 go round.
         let around = Loop { head: 1, blocks: (1..=6).collect(), backs: BTreeSet::from([6]) };
         let inner = Loop { head: 3, blocks: BTreeSet::from([3, 4]), backs: BTreeSet::from([4]) };
-        let of_line = [false, false, true, true, true, true, false];
-        assert_eq!(outside_loops(&of_line, &[around.clone(), inner]), [2, 5]);
-        assert_eq!(outside_loops(&of_line, &[around]), [2, 3, 4, 5]);
+        let mut of_line = [false, false, true, true, true, true, false].map(Some);
+        assert_eq!(outside_loops(&of_line, &[around.clone(), inner.clone()]), [2, 5]);
+        assert_eq!(outside_loops(&of_line, std::slice::from_ref(&around)), [2, 3, 4, 5]);
+        // Nothing is known of the head.
+        of_line[3] = None;
+        assert_eq!(outside_loops(&of_line, &[around, inner]), [2, 5]);
     }
 }
