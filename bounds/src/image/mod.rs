@@ -7,7 +7,6 @@ mod graph;
 mod source;
 
 pub(crate) use flow::Analysis;
-
 pub(crate) use graph::{Block, Graph, Loop};
 pub(crate) use source::{Line, plain};
 

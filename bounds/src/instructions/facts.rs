@@ -148,22 +148,17 @@ const fn each(file: &'static str, text: &'static str, each: u64) -> Fact {
     Fact::new(At::Line(file, text), each, 0)
 }
 
-/// The most steps of a loop of a stage, by their names.
-fn looked_up(shape: &Shape) -> impl Fn(&str, &str) -> u64 + use<> {
-    let works = shape.stages();
-    move |stage, name| {
-        let work = works.iter().find(|work| work.stage == stage).expect("a stage");
-        work.loops.iter().find(|(other, _)| *other == name).expect("a loop").1
-    }
-}
-
 /// What runs so often at most.
 const fn ran(file: &'static str, text: &'static str, more: u64) -> Fact {
     Fact::new(At::Code(file, text), 0, more)
 }
 
 pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
-    let of = looked_up(shape);
+    let works = shape.stages();
+    let of = |stage: &str, name: &str| -> u64 {
+        let work = works.iter().find(|work| work.stage == stage).expect("a stage");
+        work.loops.iter().find(|(other, _)| *other == name).expect("a loop").1
+    };
     let (width, height) = (shape.width, shape.height);
     let pixels = width * height;
     let rows_of_tiles = height * width.div_ceil(32);
