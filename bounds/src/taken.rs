@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     fn taken(text: &str) -> Taken {
-        let row = |figure| Rows::from([("320x240x48.map".to_owned(), figure)]);
+        let row = |figure| Rows::from(["map", "surfaces"].map(|stage| (format!("320x240x48.{stage}"), figure)));
         Taken::parse(text, &row(1000), &row(1)).unwrap()
     }
 
@@ -101,6 +101,11 @@ mod tests {
         let told = |text: &str| taken(text).bad().collect::<Vec<_>>();
         assert_eq!(told("taken map 1001\ntaken map 5"), ["map: 1001 were taken, the bound is 1000"]);
         assert_eq!(told("taken map 699"), ["map: the worst that is known takes less than 70 % of the bound 1000"]);
+        assert!(taken("taken surfaces 500").is_good());
+        assert_eq!(
+            told("taken surfaces 499"),
+            ["surfaces: the worst that is known takes less than 50 % of the bound 1000"]
+        );
     }
 
     #[test]
