@@ -214,7 +214,12 @@ impl Shape {
         let (pixels, (across, down)) = (self.pixels(), self.tiles());
         let firsts = self.width * down;
         let joins = pixels - firsts;
-        let fitted = across * down * (TILE * TILE / u64::from(self.settings.surfaces.min_pixels));
+        // Those that are cut off at the edges hold fewer.
+        let sizes = |length: u64| (0..length.div_ceil(TILE)).map(move |nth| TILE.min(length - nth * TILE));
+        let of_tile = |area: u64| area / u64::from(self.settings.surfaces.min_pixels);
+        let fitted =
+            sizes(self.width).map(|width| sizes(self.height).map(|height| of_tile(width * height)).sum::<u64>());
+        let fitted: u64 = fitted.sum();
         let rows = self.height * across;
         let loops = vec![
             ("rows_of_tiles", rows),

@@ -3,6 +3,7 @@
 mod ground;
 mod health;
 mod matching;
+mod surfaces;
 
 use super::memory::library;
 use crate::work::Shape;
@@ -46,10 +47,14 @@ pub(super) struct Fact {
     pub(super) written: usize,
     /// Loops that take so many steps together, by a name that [`Stage::groups`] has; without, as many more as any of them may alone.
     pub(super) group: Option<&'static str>,
+    /// More of them.
+    pub(super) beside: &'static [&'static str],
     /// Of these, for each step of this loop.
     pub(super) weight: u64,
     /// How often it is entered for a frame.
     pub(super) entered: Option<u64>,
+    /// What each time counts for that it is entered, in a group.
+    pub(super) begins: Option<(&'static str, u64)>,
     /// Whether only its ways back to the head count, and not that it begins: it is left within a round.
     pub(super) by_ways_back: bool,
     /// Whether it is told of every stage, and need not be in each.
@@ -65,8 +70,10 @@ impl Fact {
             by: 1,
             written: 1,
             group: None,
+            beside: &[],
             weight: 1,
             entered: None,
+            begins: None,
             by_ways_back: false,
             is_shared: false,
         }
@@ -82,6 +89,11 @@ impl Fact {
         self
     }
 
+    const fn begins(mut self, group: &'static str, weight: u64) -> Self {
+        self.begins = Some((group, weight));
+        self
+    }
+
     /// As [`Self::by`], where a round may end before all of them.
     const fn early(mut self, by: usize) -> Self {
         (self.by, self.written, self.most.each) = (by, by, by as u64);
@@ -90,6 +102,11 @@ impl Fact {
 
     const fn of(mut self, group: &'static str) -> Self {
         self.group = Some(group);
+        self
+    }
+
+    const fn and_of(mut self, groups: &'static [&'static str]) -> Self {
+        self.beside = groups;
         self
     }
 
@@ -277,63 +294,7 @@ pub(super) fn stages(shape: &Shape) -> Vec<Stage> {
             calls: vec![("fencepost_core::wire::select::heapify", 2)],
             groups: vec![],
         },
-        Stage {
-            name: "surfaces",
-            entries: vec![("entry_surfaces_run", 1)],
-            facts: [
-                vec![
-                    unwritten("fencepost_core::surfaces::part::Part::keep_largest", tiles),
-                    total("surfaces/tile.rs", "for (y, row) in rows.iter_mut()", rows_of_tiles),
-                    each("links.rs", "for (flag, (a, b)) in || *flag = u8::from(a.abs_diff", 32).by(8),
-                    total("surfaces/tile.rs", "for (run, bit) in (runs..AREA)", pixels),
-                    total("links.rs", "bit <- for bit in each_bit(up", of("surfaces", "joins")),
-                    total("links.rs", "bit <- for bit in each_bit(links.starts())", pixels),
-                    total("surfaces/tile.rs", "if parent == place", of("surfaces", "hops")),
-                    total("surfaces/tile.rs", "for run in 0..runs", pixels),
-                    total("surfaces/tile.rs", "for (y, links) in rows", rows_of_tiles),
-                    total("surfaces/mod.rs", "here.get(first) <- for (label, run) in segments(self.labels", pixels),
-                    total("surfaces/mod.rs", "here.get(first) <- for (label, run) in segments(labels)", pixels),
-                    total("surfaces/mod.rs", "*farthest = run.iter()", pixels).by(4),
-                    each("surfaces/mod.rs", "here.iter_mut().zip(labels)", width % 32),
-                    total("surfaces/mod.rs", "farthest.iter().zip(", of("surfaces", "planes")),
-                    total("surfaces/mod.rs", "if labels.iter().all(", pixels).early(4),
-                    total("surfaces/moments.rs", "for z in z {", pixels),
-                    total("surfaces/moments.rs", "for ((z, square), column) || *square = ", 3 * 32 * rows_of_tiles)
-                        .by(8),
-                    total("surfaces/moments.rs", "for (&square, column)", 3 * 32 * rows_of_tiles).by(8).written(8),
-                    total("surfaces/mod.rs", "for (i, number) in renumbered", of("surfaces", "planes")),
-                    total("surfaces/mod.rs", "for y in 0..tile.height { then for &label", rows_of_tiles),
-                    total("surfaces/mod.rs", "for y in 0..tile.height { then let pixels", rows_of_tiles),
-                    total("surfaces/mod.rs", "for y in 0..tile.height { then let v", rows_of_tiles),
-                    total("surfaces/mod.rs", "for y in 0..tile.height { then for label", rows_of_tiles),
-                    total("surfaces/mod.rs", "for label in self.labels || *label = usize::from", pixels)
-                        .by(4)
-                        .written(8),
-                    // Which are kept where there are too many.
-                    total("surfaces/mod.rs", "for &label in self.labels", pixels).by(4),
-                    total(
-                        "surfaces/mod.rs",
-                        "for &pixels in pixels.iter() || if let Some(count) = by_size",
-                        51 * tiles,
-                    ),
-                    each("surfaces/mod.rs", "for (i, &count) in by_size", 1024),
-                    each(
-                        "surfaces/mod.rs",
-                        "*found = stage.go_through || let found = part.label_tiles || keep = part.keep_largest",
-                        tiles,
-                    ),
-                    each("surfaces/mod.rs", "part.measure_tiles::", tiles),
-                ],
-                angles(),
-                // The numbers of the runs of a row, byte by byte or a word at a time; and what a tile begins with.
-                fills(pixels, tiles * 128),
-                // What lies beside a tile: how the pixels of its rows hang together, and sizes where there are too many.
-                library([32, 32], [64 * tiles + 512, 64 * tiles]),
-            ]
-            .concat(),
-            calls: vec![("libm::math::rem_pio2f::rem_pio2f", 0)],
-            groups: vec![],
-        },
+        surfaces::stage(shape, &of),
         ground::stage(shape, &of),
         matching::picture(shape),
         health::stage(shape, &of),
@@ -387,12 +348,6 @@ const fn unwritten(name: &'static str, more: u64) -> Fact {
 
 const fn function(name: &'static str, each: u64, more: u64) -> Fact {
     Fact::new(At::Function(name), each, more)
-}
-
-/// Fills of `bytes` in all, and of `words` beside.
-fn fills(bytes: u64, words: u64) -> Vec<Fact> {
-    let fact = |nth, more| Fact::new(At::LoopOf("__aeabi_memset", nth), 0, more);
-    vec![fact(0, bytes), fact(1, bytes / 4 + words), fact(2, bytes)]
 }
 
 /// Whether the lines of a place, the innermost first, are what is meant: one of some texts, and perhaps what the next line must have and

@@ -73,6 +73,7 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
     let mut together = BTreeMap::<usize, program::Sum>::new();
     let mut groups = BTreeMap::<&str, (program::Sum, u64)>::new();
     let mut by_words = BTreeMap::<&str, (program::Sum, u64, u64)>::new();
+    let mut beside = Vec::<(&str, (Count, f64))>::new();
     let mut loops = 0;
     let calls = program.calls();
     for (&at, graph) in &functions {
@@ -98,6 +99,10 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
             if let Some(most) = stage.facts[number].entered {
                 program.limit(entered.clone(), most);
             }
+            if let Some((group, weight)) = stage.facts[number].begins {
+                let (steps, _) = groups.entry(group).or_default();
+                steps.extend(entered.iter().map(|(count, factor)| (*count, factor * weight as f64)));
+            }
             let times = times_written(image, graph, &found, one, &stage.facts[number]);
             if times < written {
                 let address = graph.blocks[one.head].instructions[0];
@@ -115,7 +120,8 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
             let entered = entered.into_iter().map(|(count, factor)| (count, -factor * each as f64));
             let sum: program::Sum = rounds.chain(entered).collect();
             used.insert(number);
-            if let Some(group) = stage.facts[number].group {
+            let of_groups = stage.facts[number].group.iter().chain(stage.facts[number].beside);
+            for group in of_groups {
                 let (steps, most) = groups.entry(group).or_default();
                 steps.extend(sum.iter().map(|(count, factor)| (*count, factor * weight as f64)));
                 *most = more.max(*most);
@@ -130,7 +136,11 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
             let facts::At::Code(file, text) = fact.at else { continue };
             let of_line: Vec<_> = graph.blocks.iter().map(|block| is_all_of(image, block, file, text)).collect();
             for block in outside_loops(&of_line, &found) {
-                program.limit(vec![(Count::Block(at, block), 1.0)], fact.most.more);
+                let ran = (Count::Block(at, block), fact.weight as f64);
+                match fact.group {
+                    Some(group) => beside.push((group, ran)),
+                    None => program.limit(vec![ran], fact.most.more),
+                }
                 used.insert(number);
             }
         }
@@ -155,7 +165,12 @@ fn bound(image: &Image, stage: &Stage) -> Result<Option<Bound>, Vec<String>> {
     }
     for (name, (sum, most)) in groups {
         let told = stage.groups.iter().find(|(group, _)| *group == name);
-        program.limit(sum, told.map_or(most, |(_, most)| *most));
+        let most = told.map_or(most, |(_, most)| *most);
+        // Blocks of one line run one after the other: each counts with the loops by itself.
+        for (_, ran) in beside.iter().filter(|(group, _)| *group == name) {
+            program.limit(sum.iter().copied().chain([*ran]).collect(), most);
+        }
+        program.limit(sum, most);
     }
     let name = |at| plain(image.name(at));
     let length = |call, nth| match call {
@@ -255,9 +270,11 @@ impl Chain {
     }
 }
 
-/// Whether all of a block that is known of a line is of this one, or was inlined there; `None` if nothing is known of it.
+/// Whether all of a block that is known of a line is of this one, or was inlined there; `None` if nothing is known of it. What the
+/// compiler has put together of several lines says of no line, and of where it was inlined.
 fn is_all_of(image: &Image, block: &Block, file: &str, text: &str) -> Option<bool> {
-    let chains = block.instructions.iter().map(|&address| Chain::of(image, address));
+    let says = |address: &u32| image.lines.of_address(*address).first().is_some_and(|line| line.line != 0);
+    let chains = block.instructions.iter().filter(|address| says(address)).map(|&address| Chain::of(image, address));
     let mut known = chains.filter(|chain| !chain.0.is_empty()).peekable();
     known.peek()?;
     Some(known.all(|chain| chain.is_inlined_at(file, text)))

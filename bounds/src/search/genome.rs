@@ -164,6 +164,9 @@ impl Pattern {
 
     fn steps(&self, x: usize, y: usize, largest: u32) -> u16 {
         let [across, down] = self.size;
+        if self.kind == 1 && self.skew == 3 {
+            return (self.base + self.packed(x, y)).clamp(1, largest - 1) as u16;
+        }
         let level = match self.kind {
             // Stripes, checks and steps.
             0 => (x / across + self.skew * (y / down)) % self.levels,
@@ -200,6 +203,35 @@ impl Pattern {
         let noise = if self.noise < 32 { scattered(x, y, 5) % self.noise } else { 0 };
         let steps = self.base as i32 + self.step as i32 * level as i32 + sloped + noise as i32;
         steps.clamp(1, largest as i32 - 1) as u16
+    }
+
+    /// As many surfaces of 24 pixels as tiles hold, nearly each pixel of which is a run, and next to none of its own surface: the upper 24
+    /// of each column, and below them two combs for six columns, whose teeth lie between each other. Where a tile is cut off at 16 rows,
+    /// one and a half columns.
+    fn packed(&self, x: usize, y: usize) -> u32 {
+        let (column, row) = (x % 32, y % 32);
+        let noise = scattered(x, y, 5) % (1 + self.noise % 8);
+        if y / 32 * 32 + 32 <= self.height {
+            let level = match row {
+                0..24 => 200 * (column % 2) as u32,
+                // Their backs are the first row and the last.
+                _ => {
+                    let is_upper = row < 31 && (row == 24 || column.is_multiple_of(2));
+                    400 + 100 * (column / 6 % 2) as u32 + if is_upper { 0 } else { 50 }
+                }
+            };
+            return level + noise;
+        }
+        let (three, nth) = (column / 3, column % 3);
+        let (level, first) = if nth == 0 || nth == 1 && row < 8 { (0, 0) } else { (300, 8) };
+        let level = level + 100 * (three % 2) as u32;
+        // Steps of 16 sixteenths hang together, of 24 they do not.
+        match (row == first + self.levels, nth) {
+            (true, 1) => level + 19,
+            (true, _) => level + 9,
+            (false, 1) => level + 26 + noise,
+            (false, _) => level + noise,
+        }
     }
 }
 

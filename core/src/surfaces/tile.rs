@@ -222,7 +222,8 @@ impl TileUnion {
 
     #[inline(always)]
     fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
+        let a = self.root(a);
+        let b = self.root(b);
         self.parent[a.max(b) % AREA] = a.min(b) as u16;
     }
 }
