@@ -89,6 +89,11 @@ impl Fact {
         self
     }
 
+    const fn is_shared(mut self) -> Self {
+        self.is_shared = true;
+        self
+    }
+
     const fn begins(mut self, group: &'static str, weight: u64) -> Self {
         self.begins = Some((group, weight));
         self

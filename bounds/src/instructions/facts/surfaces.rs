@@ -23,7 +23,8 @@ pub(super) fn stage(shape: &Shape, of: &dyn Fn(&str, &str) -> u64) -> Stage {
         entries: vec![("entry_surfaces_run", 1)],
         facts: [
             vec![
-                unwritten("fencepost_core::surfaces::part::Part::keep_largest", tiles),
+                // It is a function of its own, or none.
+                unwritten("fencepost_core::surfaces::part::Part::keep_largest", tiles).is_shared(),
                 total("surfaces/tile.rs", "for (y, row) in rows.iter_mut()", rows_of_tiles),
                 each("links.rs", "for (flag, (a, b)) in || *flag = u8::from(a.abs_diff", 32).by(8),
                 // A pixel begins a run, or a run that is joined already may be joined there again.
