@@ -10,11 +10,10 @@ use crate::{
     instructions::SIZE,
 };
 
-/// Least share of its bound that a stage was seen to take, percent: below it the bound would say little. Of two stages no picture is
-/// known that comes as near: the sparse matches of the health and the strips that it matches do not want the same pictures, and neither
-/// do the many planes of surfaces and their many runs.
+/// Least share of its bound that a stage was seen to take, percent: below it the bound would say little. Of surfaces no picture is
+/// known that comes as near: their many planes and their many runs do not want the same pictures.
 fn least_percent(stage: &str) -> u64 {
-    if ["health", "surfaces"].contains(&stage) { 50 } else { 70 }
+    if stage == "surfaces" { 50 } else { 70 }
 }
 
 /// The stages: what was seen of each, and its bound.

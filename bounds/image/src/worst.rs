@@ -359,6 +359,12 @@ fn calibration(stage: &str, numbers: &[u32; 12]) -> StereoCalibration {
             camera.fy = camera.fx;
             right = camera;
         }
+        "health" if how % 4 == 2 => {
+            angle = core::f32::consts::FRAC_PI_2;
+            camera.fx *= 0.7;
+            camera.fy = camera.fx;
+            right = camera;
+        }
         "match" | "health" if how % 4 == 3 => right.cx += (number % 64) as f32,
         _ => return StereoCalibration::Rectified(pair),
     }

@@ -92,6 +92,48 @@ impl Genome {
         picture
     }
 
+    /// Whether the cameras of the health are turned by a right angle, so that rows of the pair run across those of the pictures.
+    pub(super) fn is_turned(stage: &str, numbers: &[u32; NUMBERS]) -> bool {
+        stage == "health" && numbers[11] % 4 == 2
+    }
+
+    /// The pair of grey pictures that a stage begins with.
+    pub(super) fn pair_of(&self, stage: &str, size: (usize, usize)) -> [Vec<u8>; 2] {
+        if Self::is_turned(stage, &self.numbers) { self.turned(size) } else { self.pair(size) }
+    }
+
+    /// What turned cameras see of a pair in which hardly anything matches but what the health looks at: in the upper half there is a spot
+    /// at each of its places, and in the lower half the left picture has a texture that the right one lacks. Patches are none of it.
+    fn turned(&self, (width, height): (usize, usize)) -> [Vec<u8>; 2] {
+        let n = self.numbers.map(|number| number as usize);
+        let (across, down) = (3 + n[1] % 16, 3 + n[2] % 16);
+        let amount = |x: usize, y: usize, size: usize, seed: u32, contrast: usize| {
+            scattered(x / (1 + size % 8), y / (1 + size % 8), seed) as usize % (1 + contrast % 128)
+        };
+        let is_spot = |x: usize, y: usize| {
+            let (place, strip) = (x.saturating_sub(4) * 8 / (width - 8), (y * 34 / height).div_ceil(2));
+            let middle = [4 + (width - 8) * (2 * place + 1) / 16, height * strip / 17];
+            2 * x.abs_diff(middle[0]) < across && 2 * y.abs_diff(middle[1]) < down
+        };
+        [false, true].map(|right| {
+            let pixel = |i: usize| {
+                // The pair's row goes down the picture, which shows seven pixels for ten of it.
+                let from =
+                    |place: usize, edge: usize, of: usize| (10 * place + 7 * of / 2).saturating_sub(5 * edge) / 7;
+                let (x, y) = (from(height - 1 - i / width, height, width), from(i % width, width, height));
+                let x = if right { x + n[4] % 48 } else { x };
+                let amount = match (2 * y < height, right) {
+                    (true, _) if is_spot(x, y) => amount(x, y, n[5], 1, n[3]),
+                    (true, _) => amount(x, y, n[6], 2 + u32::from(right), n[8] % 16),
+                    (false, false) => amount(x, y, n[6], 2, n[7]),
+                    (false, true) => amount(x, y, n[6], 3, n[0] % 64),
+                };
+                (64 + amount) as u8
+            };
+            (0..width * height).map(pixel).collect()
+        })
+    }
+
     /// A pair of grey pictures: a texture in the upper part and one in the lower, shifted from left to right or not the same at all.
     pub(super) fn pair(&self, (width, height): (usize, usize)) -> [Vec<u8>; 2] {
         let n = &self.numbers;

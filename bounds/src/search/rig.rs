@@ -80,7 +80,7 @@ macro_rules! rig {
                         let calibration = calibration($width, $height, stage, &genome.numbers);
                         let mount = Mount { height_m: Some(1.0), ..Mount::default() };
                         self.detector.configure(&settings, &calibration, &mount).expect("it can be configured");
-                        let pair = genome.pair(($width, $height));
+                        let pair = genome.pair_of(stage, ($width, $height));
                         let [left, right] = pair
                             .each_ref()
                             .map(|pixels| Picture::packed(pixels, $width, $height).expect("it has all pixels"));
@@ -202,7 +202,8 @@ fn level(rays: &Rays, pair: &RectifiedPair) -> std::vec::Vec<DisparityPixel> {
 }
 
 /// Cameras as the numbers say. For rectifying they may be turned, so far that rows of the pair run across those of the picture, or see
-/// nothing but their last pixel; for matching the right one may look past its picture, so that its rows end early.
+/// nothing but their last pixel; for matching the right one may look past its picture, so that its rows end early. For the health both may
+/// be turned by a right angle, and see all of the pair.
 fn calibration(width: usize, height: usize, stage: &str, numbers: &[u32; 12]) -> StereoCalibration {
     let mut pair = pair(width, height);
     let (number, how) = (numbers[9], numbers[11]);
@@ -228,6 +229,12 @@ fn calibration(width: usize, height: usize, stage: &str, numbers: &[u32; 12]) ->
         "rectify" => {
             (sin, cos) = ((number % 180) as f32).to_radians().sin_cos();
             camera.fx *= (1 + number / 180 % 4) as f32;
+            camera.fy = camera.fx;
+            right = camera;
+        }
+        _ if Genome::is_turned(stage, numbers) => {
+            (sin, cos) = (1.0, 0.0);
+            camera.fx *= 0.7;
             camera.fy = camera.fx;
             right = camera;
         }

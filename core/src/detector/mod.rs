@@ -2,7 +2,7 @@
 
 mod bands;
 mod detection;
-#[cfg(feature = "health-apart")]
+#[cfg(any(feature = "health-apart", test))]
 mod health_apart;
 #[cfg(feature = "interpret")]
 mod interpret;

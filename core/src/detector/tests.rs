@@ -13,10 +13,10 @@ use crate::{
     test_random::Random,
 };
 
-const WIDTH: usize = 160;
-const HEIGHT: usize = 120;
+pub(super) const WIDTH: usize = 160;
+pub(super) const HEIGHT: usize = 120;
 
-type Small = Detector<{ WIDTH * HEIGHT }, WIDTH, 32, 500, 64, 8, 400>;
+pub(super) type Small = Detector<{ WIDTH * HEIGHT }, WIDTH, 32, 500, 64, 8, 400>;
 
 const PAIR: RectifiedPair = RectifiedPair {
     width: WIDTH as u32,
@@ -41,14 +41,14 @@ fn settings() -> Settings {
     }
 }
 
-fn configured() -> Box<Small> {
+pub(super) fn configured() -> Box<Small> {
     let mut detector = Box::new(Small::new());
     detector.configure(&settings(), &StereoCalibration::Rectified(PAIR), &MOUNT).unwrap();
     detector
 }
 
 /// Level ground and an upright panel, both with a fine random texture, as left and right pictures.
-fn good_pair(seed: u64) -> (Vec<u8>, Vec<u8>) {
+pub(super) fn good_pair(seed: u64) -> (Vec<u8>, Vec<u8>) {
     let mut random = Random::seeded("texture", seed);
     let texture: Vec<u8> = (0..256 * 256).map(|_| random.below(256) as u8).collect();
     // What a ray meets: grey values.
@@ -91,7 +91,7 @@ fn good_pair(seed: u64) -> (Vec<u8>, Vec<u8>) {
     (draw(0.0), draw(-0.15))
 }
 
-fn picture(bytes: &[u8]) -> Picture<'_> {
+pub(super) fn picture(bytes: &[u8]) -> Picture<'_> {
     Picture::packed(bytes, WIDTH, HEIGHT).unwrap()
 }
 

@@ -28,6 +28,8 @@ fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushe
     let (decided, scanned) = (of("decided_pixels"), of("pixels_scanned_for_weak"));
     let chunks = decided / 64;
     let filtered = of("filtered_pixels") / 3;
+    // Pixels of rows that leave the window as others come in. A strip has no more rows than the window, so that none leaves it.
+    let leaving = of("column_costs_slid") / disparities - filtered;
     let margin = u64::from(settings.window_height) / 2 + 3;
     let rows = pictures * (shape.height - 2 * margin) + strips;
     let blocks = disparities.div_ceil(8);
@@ -57,9 +59,9 @@ fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushe
                 each("matching/census.rs", "for ((code, &centre)", (width - 6) % 4),
                 total("matching/rows.rs", "for ((low, high), &grey)", filtered).by(2).written(4),
                 each("matching/rows.rs", "self.kept_spans[y % KEPT] = around", 7),
-                total("matching/rows.rs", "for (sum, (&here, &flags))", 2 * filtered).by(4).written(8),
-                total("arch/thumb/slide.rs", "asm!(", of("column_costs_slid") / 2 / 8),
-                total("arch/thumb/slide.rs", "enter.left.iter().zip(leave.left)", filtered).of("rows in"),
+                total("matching/rows.rs", "for (sum, (&here, &flags))", filtered + leaving).by(4).written(8),
+                total("arch/thumb/slide.rs", "asm!(", leaving * disparities / 8),
+                total("arch/thumb/slide.rs", "enter.left.iter().zip(leave.left)", leaving).of("rows in"),
                 total(
                     "arch/thumb/slide.rs",
                     "for (x, &left_in) in (0..width).zip(enter.left)",
@@ -68,9 +70,10 @@ fn facts(name: &'static str, shape: &Shape, [pictures, strips]: [u64; 2], [pushe
                 .of("rows in"),
                 total(
                     "arch/thumb/slide.rs",
-                    "for (sums, right_in)",
+                    "for (sums, right_in) || *sums = u32",
                     begins * u64::from(settings.window_height) * width * disparities / 4,
-                ),
+                )
+                .by(4),
                 // Rows that go.
                 total("matching/mod.rs", "out.fill(DisparityPixel", pulled * width).by(2),
                 total("matching/mod.rs", "weak.contains(&true)", rows * width).early(4),
