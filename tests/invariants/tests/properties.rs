@@ -56,8 +56,8 @@ macro_rules! properties {
 #[cfg(feature = "host")]
 properties! {
     surfaces: 2000,
-    disparity: 2000,
-    pairs: 600,
+    disparity: 8000,
+    pairs: 3000,
     rectifier: 3000,
     receiver: 3000,
     command: 3000,
@@ -71,8 +71,8 @@ properties! {
 #[cfg(not(feature = "host"))]
 properties! {
     surfaces: 2000,
-    disparity: 2000,
-    pairs: 600,
+    disparity: 8000,
+    pairs: 3000,
     rectifier: 3000,
     receiver: 3000,
     command: 3000,
