@@ -61,6 +61,7 @@ properties! {
     rectifier: 3000,
     receiver: 3000,
     command: 3000,
+    stages: 10000,
     calibration: 2000,
     recording: 500,
     rig: 500,
@@ -76,4 +77,5 @@ properties! {
     rectifier: 3000,
     receiver: 3000,
     command: 3000,
+    stages: 10000,
 }
