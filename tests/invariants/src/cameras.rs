@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use fencepost_core::{
     bands::OneThread,
     detector::{Band, Detector},
-    geometry::{Mount, RectifiedPair, StereoCalibration},
+    geometry::{CameraModel, Distortion, Mount, RawPair, Rectification, RectifiedPair, StereoCalibration},
     health::{HealthLevel, HealthReason, HealthSettings},
     matching::MatchSettings,
     picture::Picture,
@@ -135,10 +135,10 @@ pub(crate) fn check(source: &mut Source<'_>) {
         ..Settings::default()
     };
     let mount = Mount { height_m: Some(1.0), pitch_down_deg: 20.0, ..Mount::default() };
-    let in_bands = source.seldom(3);
+    let (in_bands, raw) = (source.seldom(3), source.below(4) == 3);
     DETECTORS.with_borrow_mut(|detectors| {
         let Detectors { whole, cut, band } = &mut **detectors;
-        let calibration = StereoCalibration::Rectified(pair);
+        let calibration = if raw { seen_in_part(source, pair) } else { StereoCalibration::Rectified(pair) };
         assert_eq!(whole.configure(&settings, &calibration, &mount), Ok(()));
         if in_bands {
             assert_eq!(cut.configure(&settings, &calibration, &mount), Ok(()));
@@ -158,7 +158,7 @@ pub(crate) fn check(source: &mut Source<'_>) {
             let found = whole.detect(&left, &right, &mut ()).expect("pictures of the right size");
             let looked = [&left, &right].map(looked_at);
             check_told(found, &settings.health, &looked, &mut seen);
-            let all_covered = scene.covered.is_some_and(|(_, columns, _)| columns >= width);
+            let all_covered = !raw && scene.covered.is_some_and(|(_, columns, _)| columns >= width);
             assert!(
                 !all_covered || found.health.has(HealthReason::Blocked),
                 "a lens that is covered: {:?}",
@@ -170,6 +170,18 @@ pub(crate) fn check(source: &mut Source<'_>) {
             }
         }
     });
+}
+
+/// Raw pictures that fill only a part of the rectified ones.
+fn seen_in_part(source: &mut Source<'_>, pair: RectifiedPair) -> StereoCalibration {
+    let RectifiedPair { width, height, focal_px, cx, cy, .. } = pair;
+    let distortion = Distortion::default();
+    let camera = CameraModel { width, height, fx: focal_px, fy: focal_px, cx, cy, distortion };
+    let same = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let pair = RectifiedPair { cx: cx + source.within(-80.0, 80.0), cy: cy + source.within(-40.0, 40.0), ..pair };
+    let rectification = Some(Rectification { left_rotation: same, right_rotation: same, pair });
+    let translation_m = [-pair.baseline_m, 0.0, 0.0];
+    StereoCalibration::Raw(RawPair { left: camera, right: camera, rotation: same, translation_m, rectification })
 }
 
 /// Every fourth pixel of every fourth row.

@@ -7,7 +7,7 @@ use fencepost_core::{
     geometry::{DepthTable, Rays, RectifiedPair, VehicleFrame},
     ground::GroundFinder,
     map::MapBuilder,
-    matching::Matcher,
+    matching::{Matcher, ValidSpan},
     methods::{CostMap, DisparitySegments, GroundDeviation, PixelNormals},
     obstacles::ObstacleFinder,
     settings::Settings,
@@ -17,7 +17,7 @@ use fencepost_core::{
 
 use crate::{
     Source,
-    camera::{CELLS, Camera},
+    camera::{CELLS, Camera, draw},
     cameras, settings, values,
 };
 
@@ -53,9 +53,13 @@ fn check_stages(source: &mut Source<'_>) {
     for _ in 0..1 + source.below(3) {
         settings::change(source, &mut all);
     }
+    if source.below(8) == 7 {
+        (all.matching.wide_window_width, all.matching.window_height) =
+            (u16::from(source.byte()) | 1, 1 + 2 * source.below(11) as u16);
+    }
     check_words(&all);
     let Ok(frame) = VehicleFrame::new(&mount) else { return };
-    let (width, height) = (1 + source.below(2 * WIDTH), 1 + source.below(40));
+    let (width, height) = (source.below(2 * WIDTH), source.below(40));
     let pixels = width * height;
     let fits = width <= WIDTH;
     let Settings { matching, validate, surfaces, ground, obstacles, map, .. } = &all;
@@ -66,7 +70,11 @@ fn check_stages(source: &mut Source<'_>) {
     assert_fits(normals.configure(&all.pixel_normals, surfaces, width), all.pixel_normals.check(), fits);
     let mut matcher = Matcher::<WIDTH, DISPARITIES>::new();
     let room = fits && usize::from(matching.disparities) <= DISPARITIES;
-    assert_fits(matcher.configure(matching, width, height), matching.check(), room);
+    let configured = matcher.configure(matching, width, height);
+    assert_fits(configured, matching.check(), room);
+    if configured.is_ok() {
+        check_matcher(&mut matcher, (width, height), source.double_word());
+    }
     let mut finder = Surfaces::<PIXELS, SURFACES>::new();
     let found = finder.configure(surfaces, width, height);
     assert_fits(found, surfaces.check(), pixels <= PIXELS);
@@ -83,12 +91,11 @@ fn check_stages(source: &mut Source<'_>) {
     assert_fits(configured, all.ground_deviation.check(), true);
     assert_fits(MapBuilder::<CELLS>::new().configure(map, (0.1, 1.0)), map.check(CELLS), true);
 
-    // Pictures of any size for stages that were configured for this one, or refused it.
-    let count = source.below(2 * WIDTH) * source.below(24) + source.below(WIDTH);
-    let mut noise = u64::from(source.double_word());
-    let mut picture: Vec<DisparityPixel> = (0..count)
-        .map(|_| DisparityPixel::from_bits((crate::source::next(&mut noise) % 0x9000) as u16 % 200))
-        .collect();
+    // A picture of the size that was configured where there is room for it, and one of any other.
+    let mut picture = Vec::new();
+    if pixels > 0 {
+        draw(source, &Camera { pair: of_pair, mount, settings: all }, &mut picture);
+    }
     let before = picture.clone();
     size.run(&mut picture);
     for (before, after) in before.iter().zip(&picture) {
@@ -96,22 +103,56 @@ fn check_stages(source: &mut Source<'_>) {
     }
     let mut depth = DepthTable::<DISPARITIES>::new();
     depth.configure(&pair, matching.min_disparity, matching.disparities);
-    let other_width = source.below(2 * WIDTH);
-    let seen = DisparityPicture::new(&picture, other_width);
+    let same = DisparityPicture::new(&picture, width);
+    let other = DisparityPicture::new(&picture[picture.len().min(source.below(4))..], source.below(2 * WIDTH));
     let rays = Rays::new(&pair, &frame);
-    let report = finder.run(seen, &depth, &rays);
-    if (seen.width(), seen.height()) != (width, height) || found.is_err() {
-        assert_eq!((report.found, finder.table().len()), (0, 0), "surfaces in a picture of another size");
-    }
-    assert_eq!(report.found.saturating_sub(report.dropped) as usize, finder.table().len());
+    let is_same = |seen: DisparityPicture<'_>| (seen.width(), seen.height()) == (width, height);
     let mut regions = Regions::<SURFACES>::new();
-    let level = segments.run(&mut finder, &mut regions, seen, &frame);
-    assert!(level.is_none_or(|level| level.support as usize <= count), "{level:?}");
-    let mut unset = GroundFinder::new();
-    assert_eq!(unset.run(&mut finder, &mut regions, seen, (&depth, &rays)), None, "ground of what is not configured");
-    if let Some(plane) = on_ground.run(&mut finder, &mut regions, seen, (&depth, &rays)) {
-        assert!(ground.check().is_ok() && plane.camera_height_m > 0.0, "{plane:?}");
+    for seen in [other, same] {
+        let report = finder.run(seen, &depth, &rays);
+        if !is_same(seen) || found.is_err() {
+            assert_eq!((report.found, finder.table().len()), (0, 0), "surfaces in a picture of another size");
+        }
+        assert_eq!(report.found.saturating_sub(report.dropped) as usize, finder.table().len());
+        let level = segments.run(&mut finder, &mut regions, seen, &frame);
+        assert!(level.is_none_or(|level| level.support as usize <= pixels), "{level:?}");
     }
+    let mut unset = GroundFinder::new();
+    assert_eq!(unset.run(&mut finder, &mut regions, same, (&depth, &rays)), None, "ground of what is not configured");
+    // The surfaces of one picture, and another picture.
+    for seen in [same, other] {
+        finder.run(same, &depth, &rays);
+        if let Some(plane) = on_ground.run(&mut finder, &mut regions, seen, (&depth, &rays)) {
+            assert!(ground.check().is_ok() && plane.camera_height_m > 0.0, "{plane:?}");
+            let lift_m = on_ground.terrain().lift_m(2.0, 0.5);
+            assert!(is_same(seen) || lift_m == 0.0, "terrain of another picture: {lift_m} m");
+        }
+    }
+}
+
+/// Rows of any width: those that no window fits have no disparity, and those that it fits only such as were searched.
+fn check_matcher(matcher: &mut Matcher<WIDTH, DISPARITIES>, (width, height): (usize, usize), noise: u32) {
+    let settings = *matcher.settings();
+    let mut noise = u64::from(noise);
+    let all = ValidSpan::from(0..width);
+    let mut found = [DisparityPixel::from_bits(1); WIDTH];
+    let mut next = 0;
+    let fits = width >= usize::from(settings.window_width) && height >= usize::from(settings.window_height);
+    matcher.begin();
+    for _ in 0..height {
+        let mut row = [0; WIDTH];
+        row.iter_mut().for_each(|grey| *grey = crate::source::next(&mut noise) as u8);
+        matcher.push(&row[..width], &row[..width], all, all);
+        while matcher.pull(next, &mut found[..width]) {
+            next += 1;
+            for pixel in found[..width].iter().filter(|pixel| pixel.has_value()) {
+                let first = 16 * u32::from(settings.min_disparity);
+                let searched = first..first + 16 * u32::from(settings.disparities);
+                assert!(fits && searched.contains(&u32::from(pixel.steps())), "{pixel:?}: {settings:?}");
+            }
+        }
+    }
+    assert_eq!(next, height, "rows that never came: {width}, {settings:?}");
 }
 
 /// What is refused is so by its settings, or because it has no room.

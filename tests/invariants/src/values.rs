@@ -20,7 +20,16 @@ fn number(source: &mut Source<'_>) -> f32 {
 /// Any matrix has the eigenvalues that its trace and its norm ask for, and vectors that it only stretches, or is no matrix of numbers.
 pub(crate) fn check_eigen(source: &mut Source<'_>) {
     let scale = source.one_of(&[1.0, 1.0, 1.0e-30, 1.0e30, 1.0e-42, f32::MAX]);
-    let [xx, xy, xz, yy, yz, zz] = [0; 6].map(|_| number(source) * scale);
+    let [a, b, c, d, e, f] = [0; 6].map(|_| number(source));
+    // Any, all but a multiple of one, that of a plane or a line, and nothing.
+    let small = source.one_of(&[0.0, 1.0e-7, 1.0e-4]);
+    let [xx, xy, xz, yy, yz, zz] = match source.below(6) {
+        0 => [a, small * b, small * c, a + small * d, small * e, a + small * f],
+        1 => [a * a + small, a * b, a * c, b * b + small, b * c, c * c + small],
+        2 => [0.0; 6],
+        _ => [a, b, c, d, e, f],
+    }
+    .map(|entry| entry * scale);
     let matrix = SymmetricMatrix3 { xx, xy, xz, yy, yz, zz };
     let entries = [xx, xy, xz, yy, yz, zz].map(f64::from);
     let Some(eigen) = matrix.eigen() else {
