@@ -22,7 +22,7 @@ pub(crate) fn check_eigen(source: &mut Source<'_>) {
     let scale = source.one_of(&[1.0, 1.0, 1.0e-30, 1.0e30, 1.0e-42, f32::MAX]);
     let [a, b, c, d, e, f] = [0; 6].map(|_| number(source));
     // Any, all but a multiple of one, that of a plane or a line, and nothing.
-    let small = source.one_of(&[0.0, 1.0e-7, 1.0e-4]);
+    let small = source.one_of(&[0.0, 1.0e-7, 1.0e-4, 3.0e-3]);
     let [xx, xy, xz, yy, yz, zz] = match source.below(6) {
         0 => [a, small * b, small * c, a + small * d, small * e, a + small * f],
         1 => [a * a + small, a * b, a * c, b * b + small, b * c, c * c + small],
@@ -50,6 +50,12 @@ pub(crate) fn check_eigen(source: &mut Source<'_>) {
         assert!((values.iter().sum::<f64>() - trace).abs() <= 4.0e-5 * largest, "{eigen:?}, trace {trace}");
         let of_values: f64 = values.iter().map(|value| value * value).sum();
         assert!((of_values - squares).abs() <= 8.0e-5 * squares, "{eigen:?}, squares {squares}");
+        // How far they lie apart, which the squares of large ones would hide.
+        let mean = trace / 3.0;
+        let apart = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>().sqrt();
+        let diagonal = [a, d, f].iter().map(|entry| (entry - mean).powi(2)).sum::<f64>();
+        let expected = (diagonal + 2.0 * (b * b + c * c + e * e)).sqrt();
+        assert!((apart - expected).abs() <= 1.0e-4 * largest, "{eigen:?}, {apart} apart, not {expected}");
     }
     let vectors = [(eigen.smallest, values[0], eigen.lower_gap()), (eigen.largest, values[2], eigen.upper_gap())];
     for (vector, value, gap) in vectors {
