@@ -106,24 +106,26 @@ impl Camera {
 fn size(source: &mut Source<'_>) -> (usize, usize) {
     let any = (17 + source.below(24), 17 + source.below(20));
     let (which, height) = (source.byte(), source.one_of(&[16, 16, 18, 20, 33, 36, any.1]));
+    let (large, bordered) = (source.seldom(12), source.seldom(4));
     match which {
-        0..14 => ([16, 16, 20, 24, 33, 40, any.0][usize::from(which % 7)], height),
-        14..60 => (TILE + 1, 16),
-        60..106 => (16, TILE + 1),
-        106..224 => (16, 16),
-        224..236 => (TILE + 1, TILE + 1),
-        236..248 => any,
-        248.. => (WIDTH, HEIGHT),
+        0..14 if large => ([16, 16, 20, 24, 33, 40, any.0][usize::from(which % 7)], height),
+        14..60 if bordered => (TILE + 1, 16),
+        60..106 if bordered => (16, TILE + 1),
+        224..236 if large => (TILE + 1, TILE + 1),
+        236..248 if large => any,
+        248.. if large => (WIDTH, HEIGHT),
+        _ => (16, 16),
     }
 }
 
 /// How many frames a detector sees: mostly one.
 pub(crate) fn frames(source: &mut Source<'_>) -> usize {
-    match source.byte() {
-        0..160 => 1,
-        160..224 => 2,
-        224..248 => 3,
-        248.. => 4,
+    let (which, several) = (source.byte(), source.seldom(4));
+    match which {
+        160..224 if several => 2,
+        224..248 if several => 3,
+        248.. if several => 4,
+        _ => 1,
     }
 }
 
@@ -284,13 +286,16 @@ pub(crate) struct Two {
 
 impl Two {
     pub(crate) const fn new() -> Self {
-        Self { first: Small::new(), second: Small::new(), backends: [Backend::Neon; 2] }
+        Self { first: Small::new(), second: Small::new(), backends: [Backend::Dsp; 2] }
     }
 
-    /// Chooses the backends anew, now and then.
-    pub(crate) fn choose(&mut self, source: &mut Source<'_>) {
-        let choice = usize::from(source.byte());
-        let wanted = [choice % 8, choice / 8 % 8].map(|i| Backend::ALL.get(i).copied().unwrap_or(Backend::Plain));
+    /// Chooses the backends by a byte where both are compared, and now and then besides; else those that every processor has.
+    pub(crate) fn choose(&mut self, source: &mut Source<'_>, compared: bool) {
+        const USUAL: [Backend; 2] =
+            [if cfg!(target_arch = "x86_64") { Backend::Sse2 } else { Backend::Neon }, Backend::Plain];
+        let (choice, any) = (usize::from(source.byte()), source.seldom(16));
+        let chosen = [choice % 8, choice / 8 % 8].map(|i| Backend::ALL.get(i).copied().unwrap_or(Backend::Plain));
+        let wanted = if compared || any { chosen } else { USUAL };
         for ((detector, known), wanted) in
             [&mut self.first, &mut self.second].into_iter().zip(&mut self.backends).zip(wanted)
         {

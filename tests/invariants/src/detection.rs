@@ -220,6 +220,10 @@ fn check_sectors(found: &Found) {
     let sectors = &found.sectors;
     let mut clear = [false; SECTOR_COUNT];
     for (index, cell) in found.map.cells.iter().enumerate() {
+        // Of those that are not known nothing is said.
+        if !matches!(cell.state, CellState::Free | CellState::Obstacle) {
+            continue;
+        }
         let (i, j) = found.map.geometry.cell_at(index);
         let (x, y) = found.map.geometry.centre_m(i, j);
         let (x, y) = (f64::from(x), f64::from(y));

@@ -34,10 +34,10 @@ pub fn run(bytes: &[u8]) {
 impl Detectors {
     fn check(&mut self, source: &mut Source<'_>) {
         let Self { two, pixels } = self;
-        two.choose(source);
+        let twice = source.seldom(16);
+        two.choose(source, twice);
         let Two { first, second, .. } = two;
         let frames = frames(source);
-        let twice = source.below(16) == 0;
         let camera = Camera::read(source);
         let calibration = StereoCalibration::Rectified(camera.pair);
         let configured = first.configure(&camera.settings, &calibration, &camera.mount);

@@ -8,6 +8,7 @@
 #[cfg(feature = "host")]
 mod calibration;
 mod camera;
+mod cameras;
 mod command;
 mod detection;
 mod disparity;
@@ -27,7 +28,9 @@ mod rig;
 mod seeds;
 mod settings;
 mod source;
+mod stages;
 mod surfaces;
+mod values;
 
 // Each target as a function of its own: a fuzzer has only the code, and the counters, of what its target leads to.
 #[cfg(feature = "host")]
@@ -47,6 +50,7 @@ pub use rectifier::run as rectifier;
 pub use rig::run as rig;
 pub use seeds::seeds;
 pub use source::Source;
+pub use stages::run as stages;
 pub use surfaces::run as surfaces;
 
 /// One way in.
@@ -68,6 +72,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "rectifier", core: true, run: rectifier::run },
     Target { name: "receiver", core: true, run: receiver::run },
     Target { name: "command", core: true, run: command::run },
+    Target { name: "stages", core: true, run: stages::run },
     #[cfg(feature = "host")]
     Target { name: "calibration", core: false, run: calibration::run },
     #[cfg(feature = "host")]

@@ -42,7 +42,10 @@ pub(crate) fn check(source: &mut Source<'_>) {
         MatchSettings { disparities: source.one_of(&[16, 32, 48, 64, 80, any]), ..settings::matching(source) };
     // Now and then one that is refused: windows without a middle, more disparities than there is room for.
     match source.byte() {
-        0..250 => {}
+        0..240 => {}
+        240..250 => {
+            (settings.window_width, settings.window_height) = source.one_of(&[(21, 21), (17, 5), (9, 17), (21, 15)]);
+        }
         250 => settings.window_width += 1,
         251 => settings.window_height += 1,
         252 => settings.wide_window_width |= 16,

@@ -1,5 +1,7 @@
 //! Inputs to begin with.
 
+use crate::source::next;
+
 /// Inputs to begin with, made by a generator from fixed seeds: short and long ones, of small and of large bytes.
 pub fn seeds(name: &str) -> Vec<Vec<u8>> {
     let mut state = name
@@ -8,14 +10,7 @@ pub fn seeds(name: &str) -> Vec<Vec<u8>> {
     let mut seeds = texts(name);
     for length in [0, 1, 40, 120, 300, 600] {
         for mask in [0xFF, 0x3F, 0x07] {
-            let bytes = (0..length).map(|_| {
-                // SplitMix64 (Steele, Lea, Flood 2014).
-                state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-                let mut z = state;
-                z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-                z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-                (z ^ (z >> 31)) as u8 & mask
-            });
+            let bytes = (0..length).map(|_| next(&mut state) as u8 & mask);
             seeds.push(bytes.collect());
         }
     }

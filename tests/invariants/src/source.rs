@@ -4,32 +4,48 @@ use arbitrary::Unstructured;
 
 /// The bytes of an input. Behind their end everything is zero.
 #[derive(Debug)]
-pub struct Source<'a>(Unstructured<'a>);
+pub struct Source<'a> {
+    bytes: Unstructured<'a>,
+    /// The state of a generator that begins with what the bytes hash to.
+    chance: u64,
+}
 
 impl<'a> Source<'a> {
     /// Begins with the first byte.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self(Unstructured::new(bytes))
+        // FNV-1a, eight bytes at a time.
+        let mix = |hash: u64, bytes: &[u8]| {
+            let word = bytes.iter().fold(0, |word, byte| word << 8 | u64::from(*byte));
+            (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3)
+        };
+        let chance = bytes.chunks(8).fold(0xcbf2_9ce4_8422_2325, mix);
+        Self { bytes: Unstructured::new(bytes), chance }
+    }
+
+    /// Whether what takes long is to be done: for one in `many` inputs. Which ones is drawn from a hash of all bytes. One byte would
+    /// not do: a fuzzer goes on with the inputs that reach the most, which are those that take the longest, and soon most would be.
+    pub fn seldom(&mut self, many: u64) -> bool {
+        next(&mut self.chance).is_multiple_of(many)
     }
 
     /// Whether all bytes are used up.
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.bytes.is_empty()
     }
 
     /// The next byte.
     pub fn byte(&mut self) -> u8 {
-        self.0.arbitrary().unwrap_or(0)
+        self.bytes.arbitrary().unwrap_or(0)
     }
 
     /// The next two bytes.
     pub fn word(&mut self) -> u16 {
-        self.0.arbitrary().unwrap_or(0)
+        self.bytes.arbitrary().unwrap_or(0)
     }
 
     /// The next four bytes.
     pub fn double_word(&mut self) -> u32 {
-        self.0.arbitrary().unwrap_or(0)
+        self.bytes.arbitrary().unwrap_or(0)
     }
 
     /// One of two by the lowest bit of a byte.
@@ -68,12 +84,21 @@ impl<'a> Source<'a> {
 
     /// The next bytes, up to `most`.
     pub fn bytes(&mut self, most: usize) -> &'a [u8] {
-        let count = self.0.len().min(most);
-        self.0.bytes(count).unwrap_or_default()
+        let count = self.bytes.len().min(most);
+        self.bytes.bytes(count).unwrap_or_default()
     }
 
     /// All bytes that are left.
     pub fn rest(&mut self) -> &'a [u8] {
         self.bytes(usize::MAX)
     }
+}
+
+/// The next number of a generator: SplitMix64 (Steele, Lea, Flood 2014).
+pub(crate) fn next(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
 }

@@ -56,11 +56,12 @@ macro_rules! properties {
 #[cfg(feature = "host")]
 properties! {
     surfaces: 2000,
-    disparity: 2000,
-    pairs: 600,
+    disparity: 8000,
+    pairs: 3000,
     rectifier: 3000,
     receiver: 3000,
     command: 3000,
+    stages: 10000,
     calibration: 2000,
     recording: 500,
     rig: 500,
@@ -71,9 +72,10 @@ properties! {
 #[cfg(not(feature = "host"))]
 properties! {
     surfaces: 2000,
-    disparity: 2000,
-    pairs: 600,
+    disparity: 8000,
+    pairs: 3000,
     rectifier: 3000,
     receiver: 3000,
     command: 3000,
+    stages: 10000,
 }
