@@ -222,6 +222,33 @@ fn a_plane_that_is_too_steep_or_above_the_camera_or_hardly_seen_is_none() {
 }
 
 #[test]
+fn pixels_are_obstacle_or_ground_up_to_the_limits_and_at_them() {
+    let world = World::empty(1.0, 10.0, 0.0);
+    let mut made = Made::new(&world, 0.0, &mut Random::seeded("no noise", 0));
+    made.pixels.fill(DisparityPixel::from_steps(300));
+    let Made { pixels, stages, map, detector } = &mut made;
+    let Stages { frame, place, rays, depth, .. } = stages;
+    let view = View { pair: &PAIR, frame, place, rays, depth, nearest_m: 0.0 };
+    let (picture, level) = (DisparityPicture::new(pixels, 320), GroundPlane::of_mount(frame));
+    let heights: Vec<f32> =
+        (0..240).map(|y| level.height_m(row_points(picture, depth, rays, y).next().unwrap().1)).collect();
+    let mut codes = vec![9; pixels.len()];
+    for (low, high) in [(0.3, 0.9), (heights[30], heights[9]), (-heights[220], heights[2])] {
+        let settings = CostMapSettings { min_height_m: low, max_height_m: high, ..CostMapSettings::default() };
+        detector.configure(&settings, &GroundSettings::default(), 1).unwrap();
+        detector.count(picture, &view, &level, map, &mut codes);
+        for (y, &height) in heights.iter().enumerate() {
+            let expected = match height {
+                h if h >= low && h <= high => OBSTACLE,
+                h if h > -low && h < low => GROUND,
+                _ => OTHER,
+            };
+            assert_eq!(codes[y * 320], expected, "{height} m, from {low} to {high} m");
+        }
+    }
+}
+
+#[test]
 fn columns_hold_as_many_points_as_they_have_room_for() {
     // All of the picture in one column: more points than 16 bits count.
     let mut world = World::empty(1.0, 0.0, 0.0);

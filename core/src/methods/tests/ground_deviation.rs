@@ -5,6 +5,7 @@ use std::{vec, vec::Vec};
 use super::*;
 use crate::{
     disparity::{DisparityPixel, Reason},
+    geometry::{Mount, Place},
     test_random::Random,
     test_world::{PAIR, Patch, Point, World, ground},
 };
@@ -187,6 +188,9 @@ fn choices_are_those_of_splitmix64() {
     for number in expected {
         assert_eq!(random.below(1 << 32) as u64, number >> 32);
     }
+    // Another one of the kind, from the same beginning on.
+    let (mut random, mut other) = (Choice(0x5eed_013a), Random::seeded("choices", 0x5eed_013a));
+    assert!((0..200).all(|_| random.below(1 << 32) as u64 == other.next() >> 32));
     assert!((0..100).all(|_| random.below(7) < 7 && random.below(1) == 0 && random.below(0) == 0));
 }
 
@@ -222,9 +226,9 @@ fn a_plane_is_ground_within_the_limits_of_tilt_and_height() {
 #[test]
 fn limits_of_deviation_are_those_of_the_settings_or_of_the_noise() {
     let settings =
-        GroundDeviationSettings { deviation_px: 1.0, deviation_sigmas: 3.0, ..GroundDeviationSettings::default() };
+        GroundDeviationSettings { deviation_px: 2.0, deviation_sigmas: 3.0, ..GroundDeviationSettings::default() };
     let detector = with(small_pair(40, 30), settings, GroundSettings::default());
-    for (noise_steps, limit) in [(0.0, 16), (5.0, 16), (8.0, 24)] {
+    for (noise_steps, limit) in [(0.0, 32), (10.0, 32), (12.0, 36)] {
         let plane = DisparityPlane { at: 400.0, along_u: 2.0, along_v: 5.0 };
         let on_plane = |place: usize| 400 + 2 * (place as i32 % 40 - 20) + 5 * (place as i32 / 40 - 15);
         for (off, class) in [
@@ -245,12 +249,20 @@ fn limits_of_deviation_are_those_of_the_settings_or_of_the_noise() {
             assert!(codes.iter().all(|&code| code == class), "{off} of {limit}: {codes:?}");
         }
     }
+    // Where the ground is as far away as can be, no disparity still is none.
+    let far = GroundDisparity { plane: DisparityPlane { at: 5.0, ..DisparityPlane::default() }, noise_steps: 0.0 };
+    let (mut codes, nothing) = (vec![9; 1200], vec![DisparityPixel::none(Reason::NotUnique); 1200]);
+    detector.classify(DisparityPicture::new(&nothing, 40), &far, &mut codes);
+    assert!(codes.iter().all(|&code| code == OTHER));
 }
 
 #[test]
 fn support_and_scatter_are_those_of_the_pixels_near_the_plane() {
     let mut random = Random::seeded("support", 0x5eed_0133);
-    for (offset_px, tilt, samples) in [(0.0, 0.0, 4800), (-2.5, 0.06, 4800), (1.5, -0.05, 1200)] {
+    // In the first picture every fourth column has no disparities.
+    for (offset_px, tilt, samples, support) in
+        [(0.0, 0.0, 4800, 2400), (-2.5, 0.06, 4800, 3200), (1.5, -0.05, 1200, 3200)]
+    {
         let pair = RectifiedPair { disparity_offset_px: offset_px, ..small_pair(80, 60) };
         let mut world = World { pair, ..World::empty(1.2, 45.0, 0.0) };
         let middle = Point::new(0.0, 0.0, 0.1);
@@ -262,6 +274,10 @@ fn support_and_scatter_are_those_of_the_pixels_near_the_plane() {
         // Of three pixels two lie near the plane, and the third just beyond what is near, and on one side of it.
         let mut squares = (0.0_f64, 0.0_f64);
         for (i, pixel) in pixels.iter_mut().enumerate() {
+            if support == 2400 && i % 4 == 0 {
+                *pixel = DisparityPixel::none(Reason::LowTexture);
+                continue;
+            }
             let far = (i % 80 + i / 80) % 3 == 0;
             let noise = if far { random.within(17.0, 22.0) } else { random.within(-5.0, 5.0) };
             *pixel = DisparityPixel::from_steps((f64::from(clean[i]) + noise).round() as u16);
@@ -281,13 +297,24 @@ fn support_and_scatter_are_those_of_the_pixels_near_the_plane() {
             with(pair, settings, ground).ground(picture)
         };
         let (_, found) = under(1.0).expect("the ground is seen");
-        assert_eq!(found.support, 3200, "two of three pixels");
+        assert_eq!(found.support, support, "two of three pixels");
         let (rms, told) = ((squares.0 / squares.1).sqrt(), f64::from(found.rms_m));
         assert!((told / rms - 1.0).abs() < 0.08, "{told} m off the plane, not {rms} m");
         let (height, offset) = (truth.dot(&(Point::new(0.0, 0.0, 1.2) - middle)), truth.dot(&middle));
         assert!((f64::from(found.camera_height_m) - height).abs() < 0.01, "{found:?}, not {height} m");
         assert!((f64::from(found.offset_m) - offset).abs() < 0.01, "{found:?}, not {offset} m");
-        // 3200 of 4800 are 666.7 permille.
-        assert!(under(666.0).is_some() && under(667.5).is_none());
+        // 3200 of 4800 are 666.7 permille; just as many as there have to be are enough.
+        let permille = support as f32 / 4.8;
+        assert!(under(permille - 0.7).is_some() && under(permille + 0.7).is_none());
+        assert!(support != 2400 || under(500.0).is_some());
+        // In the frame of a vehicle that the camera does not stand in the middle of, the plane is the same, moved.
+        let mount = Mount { forward_m: 1.5, left_m: -0.7, ..world.mount() };
+        let mut placed = GroundDeviation::new();
+        let (ground, frame) = (GroundSettings::default(), VehicleFrame::new(&mount).unwrap());
+        placed.configure(&settings, &ground, &pair, &frame, true).unwrap();
+        let (_, moved) = placed.ground(picture).unwrap();
+        let expected = found.moved(&Place::new(&mount));
+        assert!((moved.offset_m - expected.offset_m).abs() < 1.0e-4, "{moved:?}, not {expected:?}");
+        assert!((moved.camera_height_m - found.camera_height_m).abs() < 1.0e-4);
     }
 }

@@ -254,14 +254,14 @@ fn a_plane_has_the_class_of_its_angle_wherever_it_faces() {
 
 #[test]
 fn pixels_without_a_class_take_that_of_the_nearest_one_on_their_surface() {
-    const SIZE: (usize, usize) = (31, 17);
+    const SIZE: (usize, usize) = (23, 11);
     let mut random = Random::seeded("nearest classes", 0x5eed_0138);
     let mut taken = 0;
     for window in [3_u16, 7, 11, 21] {
-        let mut detector = PixelNormals::<31>::new();
+        let mut detector = PixelNormals::<23>::new();
         let settings = PixelNormalSettings { window, ..PixelNormalSettings::default() };
-        detector.configure(&settings, &SurfaceSettings { step_sixteenths: 16, ..Default::default() }, 31).unwrap();
-        for _ in 0..12 {
+        detector.configure(&settings, &SurfaceSettings { step_sixteenths: 16, ..Default::default() }, 23).unwrap();
+        for _ in 0..7 {
             // Upright strips, one beside the other, whose disparities are just contiguous with the next, or just not; some have none,
             // and small disparities lie beside those.
             let (mut strips, mut steps, mut strip) = (vec![], vec![], 0);
@@ -308,7 +308,7 @@ fn pixels_without_a_class_take_that_of_the_nearest_one_on_their_surface() {
             }
         }
     }
-    assert!(taken > 3000, "{taken}");
+    assert!(taken > 1500, "{taken}");
 }
 
 #[test]
@@ -316,7 +316,7 @@ fn classes_of_some_pixels_are_those_of_planes_fitted_around_them() {
     let mut random = Random::seeded("some pixel normals", 0x5eed_0139);
     let world = World::empty(1.1, 14.0, 2.0);
     let mut counts = [0; 4];
-    for (window, min_filled_percent) in [(3, 60), (3, 0), (7, 50), (11, 70), (21, 30)] {
+    for (window, min_filled_percent) in [(3, 60), (3, 0), (7, 50), (11, 70)] {
         let settings = PixelNormalSettings { window, min_filled_percent, ..PixelNormalSettings::default() };
         // Planes in blocks of 40 x 30 pixels, the upper part of the picture without disparities.
         let blocks: Vec<[f64; 3]> = (0..64)
@@ -334,7 +334,7 @@ fn classes_of_some_pixels_are_those_of_planes_fitted_around_them() {
             })
             .collect();
         let codes = classes(&world, &pixels, &settings);
-        for _ in 0..400 {
+        for _ in 0..150 {
             let at = 170 * 320 + random.below(70 * 320) as usize;
             if !pixels[at].has_value() {
                 assert_eq!(codes[at], NONE);
@@ -346,5 +346,5 @@ fn classes_of_some_pixels_are_those_of_planes_fitted_around_them() {
             }
         }
     }
-    assert!(counts[1..].iter().all(|&pixels| pixels > 20), "{counts:?}");
+    assert!(counts[1..].iter().all(|&pixels| pixels > 10), "{counts:?}");
 }
