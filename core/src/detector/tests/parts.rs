@@ -179,23 +179,31 @@ fn exchanged_cameras_are_looked_for_in_strips_all_over_the_picture() {
     };
     // The middles of eight strips, evenly apart, and what their windows reach: two rows, and three of the codes.
     let reach = 5;
-    let in_strip = |y: usize, part: usize| (1..=8).any(|i| y.abs_diff(TALL * i / 9) <= reach && i % 8 < part);
-    let strips = tall_pair(|y| in_strip(y, 8));
+    let strip_of = |y: usize| (1..=8).find(|i| y.abs_diff(TALL * i / 9) <= reach);
+    let strips = tall_pair(|y| strip_of(y).is_some());
     assert!(exchanged(&strips, 0, 0));
-    assert!(!exchanged(&tall_pair(|y| !in_strip(y, 8)), 0, 0), "between the strips");
+    assert!(!exchanged(&tall_pair(|y| strip_of(y).is_none()), 0, 0), "between the strips");
     // One strip in eight is too few, though nothing at all matches as given.
-    assert!(!exchanged(&tall_pair(|y| in_strip(y, 1)), 0, 0), "one strip");
+    assert!(!exchanged(&tall_pair(|y| strip_of(y) == Some(4)), 0, 0), "one strip");
 
     // It must be more than twice as much as matches as given, small surfaces included: matched / (8 x width) against
     // n / (width x height) gives way at 19 matched, of 8 x width and more than half of them.
     let most = NARROW * 8 * 19;
-    let (mut some, mut too_many) = (0, most as u32);
-    while too_many - some > 1 {
-        let n = some.midpoint(too_many);
-        *(if exchanged(&strips, n, 0) { &mut some } else { &mut too_many }) = n;
-    }
-    let gives_way = too_many;
+    let mut gives_way_at = |pair: &(Vec<u8>, Vec<u8>)| {
+        let (mut some, mut too_many) = (0, most as u32);
+        while too_many - some > 1 {
+            let n = some.midpoint(too_many);
+            *(if exchanged(pair, n, 0) { &mut some } else { &mut too_many }) = n;
+        }
+        too_many
+    };
+    let gives_way = gives_way_at(&strips);
     assert!(gives_way.is_multiple_of(19), "{gives_way}");
     assert!((0.5..1.0).contains(&(f64::from(gives_way) / most as f64)), "{gives_way} of {most}");
+    // Each strip counts.
+    for missing in 1..=8 {
+        let fewer = gives_way_at(&tall_pair(|y| strip_of(y).is_some_and(|strip| strip != missing)));
+        assert!(fewer + 19 * 30 < gives_way, "without strip {missing}: {fewer} of {gives_way}");
+    }
     assert!(!exchanged(&strips, 0, gives_way) && exchanged(&strips, 1, gives_way - 2));
 }
