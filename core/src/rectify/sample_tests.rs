@@ -9,23 +9,25 @@ use crate::test_random::Random;
 
 const ONE: i32 = 1 << PLACE_SHIFT;
 
-/// Grey values of a picture whose rows may lie farther apart than they are long.
+/// Grey values of a picture whose rows may lie farther apart than they are long, and that may be larger than it was said to be.
 struct Raw {
     bytes: Vec<u8>,
     size: (usize, usize),
+    whole: (usize, usize),
     stride: usize,
 }
 
 impl Raw {
     fn new(random: &mut Random) -> Self {
         let size = (1 + random.below(50) as usize, 1 + random.below(30) as usize);
-        let stride = size.0 + random.below(20) as usize;
-        let bytes = (0..stride * size.1).map(|_| [0, 255, random.next() as u8][random.below(3) as usize]).collect();
-        Self { bytes, size, stride }
+        let whole = (size.0 + random.below(3) as usize, size.1 + random.below(3) as usize);
+        let stride = whole.0 + random.below(20) as usize;
+        let bytes = (0..stride * whole.1).map(|_| [0, 255, random.next() as u8][random.below(3) as usize]).collect();
+        Self { bytes, size, whole, stride }
     }
 
     fn source(&self) -> Source<'_> {
-        Source::new(&Picture::new(&self.bytes, self.size.0, self.size.1, self.stride).unwrap(), self.size)
+        Source::new(&Picture::new(&self.bytes, self.whole.0, self.whole.1, self.stride).unwrap(), self.size)
     }
 
     /// The grey value at a place, in 64ths of a pixel; `None` outside of the picture.
