@@ -1,9 +1,9 @@
 """Runs the mutants of a module that can be woven into one program (tests/weave), each in a run of its own of the module's tests.
 
-usage: weave_mutants.py WEAVER TREE RESULTS_FOLDER MODULE [all]
+usage: weave_mutants.py WEAVER TREE RESULTS_FOLDER "MODULE [HOLDER...]" [all]
 
-A mutant is tried with the tests of its module, first the quick ones; with `all`, those that are still alive also with the tests of the
-modules that name it.
+A mutant is tried with the tests of its module, given with other modules whose tests hold it, first the quick ones; with `all`, those
+that are still alive also with the tests of the modules that name it.
 
 RESULTS_FOLDER has the mutants in `list.json`. To its `outcomes` a line is added for each mutant that was run, and mutants that are there
 are not run again, unless they lived: there may be new tests. `left` has those that a build of their own must judge, `slow` the tests
@@ -122,8 +122,9 @@ def naming(tree, module):
             if re.search(rf"\b{module}::", path.read_text())}  # fmt: skip
 
 
-def main(weaver, tree, folder, module, thorough=""):
-    tree, folder = Path(tree), Path(folder)
+def main(weaver, tree, folder, held, thorough=""):
+    tree, folder, holders = Path(tree), Path(folder), held.split()
+    module, tests_of = holders[0], [f"{holder}::" for holder in holders]
     listed = folder / "list.json"
     mutants = json.loads(listed.read_text())
     sources = {path: (tree / path).read_text() for path in {"core/src/lib.rs"} | {mutant["file"] for mutant in mutants}}
@@ -135,9 +136,9 @@ def main(weaver, tree, folder, module, thorough=""):
         programs, woven, impossible = weave(weaver, listed, tree, folder, sources, targets)
         runs = Runs(programs, tree)
         # The tests of a module have its name in theirs, but for those of the wire that look at it from outside.
-        times = runs.times([] if thorough or module == "wire" else [f"{module}::"])
+        times = runs.times([] if thorough or module == "wire" else tests_of)
         quick = {test for test, seconds in times.items() if seconds < QUICK_S}
-        own = {test for test in times if test[1].startswith(f"{module}::") or (module, test[0]) == ("wire", "wire")}
+        own = {test for test in times if test[1].startswith(tuple(tests_of)) or (module, test[0]) == ("wire", "wire")}
         users = {test for test in times if thorough and test[1].split("::")[0] in naming(tree, module)}
         (folder / "slow").write_text("".join(f"{test}\n" for _, test in times.keys() - quick))
         began = time.monotonic()

@@ -242,3 +242,6 @@ pub(crate) fn compiled(chosen: Chosen, steps: impl Steps) {
         steps.run();
     }
 }
+
+#[cfg(test)]
+mod tests;

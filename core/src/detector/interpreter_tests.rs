@@ -256,6 +256,31 @@ fn a_checked_frame_is_the_unchecked_one_but_for_doubts() {
     assert!(disputed > 100, "{disputed} cells are disputed");
 }
 
+/// The ground that each of the two holds is its own, and both forget it.
+#[test]
+fn the_ground_is_held_by_each_detector_for_itself() {
+    let world = World::level(1.0, 12.0, 0.0);
+    let (ground, nothing) = (world.render(), std::vec![DisparityPixel::none(Reason::LowTexture); 320 * 240]);
+    let mut held = settings(DetectorKind::SurfaceNormals, Some(DetectorKind::PixelNormals));
+    held.ground.hold_frames = 3;
+    let setup = setup(&world.pair, &world.mount());
+    let mut interpreter = Box::new(Small::new());
+    let mut found = Box::new(Found::new());
+    // For each picture the frames since the main detector saw the ground, and since the other one did.
+    let mut ages = |interpreter: &mut Small, pixels: &[DisparityPixel]| {
+        found.clear();
+        interpreter.run(DisparityPicture::new(pixels, 320), &setup, &mut found, &mut Alone, &mut ());
+        [found.ground, interpreter.ground_of_check].map(|plane| plane.map(|plane| plane.age_frames))
+    };
+    interpreter.configure(&held, &setup, true).unwrap();
+    assert_eq!(ages(&mut interpreter, &ground), [Some(0), Some(0)]);
+    assert_eq!(ages(&mut interpreter, &nothing), [Some(1), Some(1)]);
+    assert_eq!(ages(&mut interpreter, &nothing), [Some(2), Some(2)]);
+    assert_eq!(ages(&mut interpreter, &ground), [Some(0), Some(0)]);
+    interpreter.forget();
+    assert_eq!(ages(&mut interpreter, &nothing), [None, None]);
+}
+
 #[test]
 fn a_detector_does_not_check_itself() {
     let mut interpreter = Box::new(Small::new());

@@ -178,6 +178,13 @@ mod tests {
     }
 
     #[test]
+    fn parts_that_belong_together_are_as_large_as_both() {
+        let both = MemoryPart::of::<u64>("both").and::<[u8; 3]>();
+        assert_eq!(both, MemoryPart { name: "both", bytes: 11, align: 1 });
+        assert_eq!(MemoryPart::of::<u32>("one"), MemoryPart { name: "one", bytes: 4, align: 4 });
+    }
+
+    #[test]
     fn tells_the_size_of_a_band() {
         for (found, (width, height, disparities)) in [
             (size_of::<Band<320, 48, 2500>>(), (320, 240, 48)),

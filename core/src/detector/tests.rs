@@ -1,5 +1,7 @@
 //! The whole chain on small pictures: what it refuses, what it survives, what it repeats.
 
+mod parts;
+
 use std::{boxed::Box, string::String, vec, vec::Vec};
 
 use super::*;

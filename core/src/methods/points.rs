@@ -78,3 +78,7 @@ impl PointSums {
         self.joined.joined(&Scatter { weight: self.count as f32, mean_m, covariance })
     }
 }
+
+#[cfg(test)]
+#[path = "tests/points.rs"]
+mod tests;

@@ -207,3 +207,7 @@ impl Default for ConfidenceSettings {
         Self { disputed_percent: 50, unconfirmed_percent: 80 }
     }
 }
+
+#[cfg(test)]
+#[path = "tests/settings.rs"]
+mod tests;

@@ -298,3 +298,7 @@ fn blend(upper: [u16; 2], lower: [u16; 2], across: u16, down: u16) -> u8 {
     let sum = left.wrapping_mul(WEIGHT_ONE - across).wrapping_add(right.wrapping_mul(across));
     (sum.wrapping_add(1 << (LAST - 1)) >> LAST) as u8
 }
+
+#[cfg(test)]
+#[path = "sample_tests.rs"]
+mod tests;

@@ -135,3 +135,7 @@ impl<const WIDTH: usize> Work for RowsOfBand<'_, WIDTH> {
         arch::compiled(stage.chosen, Rows { stage, picture, seams: *seams });
     }
 }
+
+#[cfg(test)]
+#[path = "bands_tests.rs"]
+mod tests;

@@ -142,3 +142,15 @@ pub(super) fn compiled(chosen: Chosen, steps: impl Steps) {
         _ => steps.run(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_backend_needs_all_of_its_features() {
+        for features in 0..64_u32 {
+            assert_eq!(all(features, [0, 2, 5]), features & 0b10_0101 == 0b10_0101, "{features:#b}");
+        }
+    }
+}

@@ -248,6 +248,25 @@ fn more_surfaces_than_the_table_takes_are_left_out_alike() {
 }
 
 #[test]
+fn a_picture_is_cut_into_no_more_bands_than_there_may_be() {
+    let mut random = Random::seeded("many bands", 0x5eed_0505);
+    let (mut alone, mut cut) = (Box::new(Small::new()), Box::new(Small::new()));
+    for detector in [&mut alone, &mut cut] {
+        detector.configure(&settings(), &StereoCalibration::Rectified(pair(WIDTH, HEIGHT)), &MOUNT).unwrap();
+    }
+    let mut bands: Vec<SmallBand> = (0..MAX_BANDS + 1).map(|_| SmallBand::new()).collect();
+    // The right picture is darker: what is told of exposures is told of each.
+    let [left, mut right] = pictures(&mut random, WIDTH, HEIGHT);
+    right.iter_mut().for_each(|grey| *grey /= 3);
+    let [left, right] = [&left, &right].map(|bytes| Picture::packed(bytes, WIDTH, HEIGHT).unwrap());
+    for others in [0, 1, MAX_BANDS - 2, MAX_BANDS - 1, MAX_BANDS, MAX_BANDS + 1] {
+        alone.detect(&left, &right, &mut ()).unwrap();
+        cut.detect_in_bands(&left, &right, &mut bands[..others], &mut OneThread, &mut ()).unwrap();
+        assert!(told(&alone) == told(&cut), "{others} bands beside the first");
+    }
+}
+
+#[test]
 fn what_cannot_be_looked_at_is_refused_as_without_bands() {
     let mut detector = Box::new(Small::new());
     let bytes = [0; 40 * 40];

@@ -45,6 +45,18 @@ fn level(offset_m: f32, camera_height_m: f32, support: u32) -> GroundPlane {
 }
 
 #[test]
+fn heights_are_measured_from_the_plane_of_another_detector() {
+    let mut finder = finder(&settings());
+    for offset_m in [0.4, -0.3] {
+        finder.flatten(level(offset_m, 1.2 - offset_m, 50));
+        assert_eq!(finder.terrain().plane().offset_m, offset_m);
+        for p in [[3.0, 0.0, 1.0], [5.0, -4.0, 0.0], [9.0, 7.0, -1.0]] {
+            assert!((finder.terrain().height_m(p) - (p[2] - offset_m)).abs() < 1.0e-6, "{p:?}");
+        }
+    }
+}
+
+#[test]
 fn ground_can_be_as_high_and_low_as_tilt_and_tolerance_let_it() {
     let finder = finder(&settings());
     // 5 m away, at 45 degrees: 5 m up or down, and half a metre that the height of the mount may be wrong.

@@ -131,22 +131,26 @@ fn high_and_narrow_windows_agree_with_the_plain_version() {
     for (window_height, wide_window_width) in
         [(17, 7), (17, 15), (19, 9), (19, 13), (21, 7), (21, 11), (15, 17), (13, 19)]
     {
-        // Pictures of noise that fit nowhere cost as much as there is.
-        let mut noise =
-            || -> Grey { (0..40).map(|_| (0..100).map(|_| 1 + random.below(254) as u8).collect()).collect() };
-        let spans = vec![(ValidSpan { start: 0, end: 100 }, ValidSpan { start: 0, end: 100 }); 40];
-        let pair = Pair { left: noise(), right: noise(), spans };
-        let settings = MatchSettings {
-            wide_window_width,
-            weak_texture: 1000,
-            texture: 0,
-            weak_uniqueness_percent: 100,
-            wide_uniqueness_percent: 0,
-            ..with(0, [5, window_height])
-        };
-        matcher.configure(&settings, 100, 40).unwrap();
-        let expected = Plain::new(&pair, settings).picture(&mut seen);
-        assert!(run(&mut matcher, &pair) == expected, "{window_height} rows, {wide_window_width} columns");
+        // Pictures of noise that fit nowhere cost as much as there is; where all rows are alike, all of a column fits or nothing of it.
+        for alike in [false, true] {
+            let mut noise = || -> Grey {
+                let mut row = || (0..100).map(|_| 1 + random.below(254) as u8).collect::<Vec<u8>>();
+                if alike { vec![row(); 40] } else { (0..40).map(|_| row()).collect() }
+            };
+            let spans = vec![(ValidSpan { start: 0, end: 100 }, ValidSpan { start: 0, end: 100 }); 40];
+            let pair = Pair { left: noise(), right: noise(), spans };
+            let settings = MatchSettings {
+                wide_window_width,
+                weak_texture: 1000,
+                texture: 0,
+                weak_uniqueness_percent: 100,
+                wide_uniqueness_percent: 0,
+                ..with(0, [5, window_height])
+            };
+            matcher.configure(&settings, 100, 40).unwrap();
+            let expected = Plain::new(&pair, settings).picture(&mut seen);
+            assert!(run(&mut matcher, &pair) == expected, "{window_height} rows, {wide_window_width} columns, {alike}");
+        }
     }
     assert!(seen.iter().any(|((_, asked, reason), times)| (*asked, *reason) == (Asked::Wide, None) && *times > 1000));
 }

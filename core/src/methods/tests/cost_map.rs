@@ -10,7 +10,7 @@ use crate::{
     map::{MapGeometry, MapSettings},
     obstacles::ObstacleSettings,
     test_random::Random,
-    test_world::{DISPARITIES, PAIR, Point, Stages, World},
+    test_world::{DISPARITIES, PAIR, Patch, Point, Stages, World, ground},
 };
 
 const CELLS: usize = 2500;
@@ -170,16 +170,100 @@ fn a_cell_is_what_its_counts_say() {
         {
             let counted = Evidence { obstacle, ground, unclear: 3, height_dm: 8 };
             let found = detector.verdict(&counted, cell, ground_seen);
+            let unknown = |state| Cell { state, cost: obstacle, ..Cell::default() };
             let expected = match obstacle {
-                _ if cell == far => CellState::Unknown(UnknownReason::TooFar),
-                20.. => CellState::Obstacle,
-                0 if ground >= 10 && ground_seen => CellState::Free,
-                _ if cell == free => CellState::Unknown(UnknownReason::TooFewPixels),
-                _ => cell.state,
+                _ if cell == far => unknown(far.state),
+                20.. => {
+                    Cell { state: CellState::Obstacle, pixels: obstacle, height_dm: 8, cost: obstacle, ..Cell::CERTAIN }
+                }
+                0 if ground >= 10 && ground_seen => Cell { state: CellState::Free, pixels: ground, ..Cell::CERTAIN },
+                _ if cell == free => unknown(CellState::Unknown(UnknownReason::TooFewPixels)),
+                _ => unknown(cell.state),
             };
-            assert_eq!((found.state, found.cost), (expected, obstacle), "{counted:?}");
+            assert_eq!(found, expected, "{counted:?}");
         }
     }
+}
+
+/// The plane of a world under these limits, with at least so many columns, and how many are flat.
+fn plane_under(world: &World, ground: GroundSettings, min_columns: u16) -> (Option<GroundPlane>, u16) {
+    let mut made = Made::new(world, 0.0, &mut Random::seeded("no noise", 0));
+    let settings = CostMapSettings { min_columns, max_level_m: 1.2, ..CostMapSettings::default() };
+    made.detector.configure(&settings, &ground, 320 * 240).unwrap();
+    let Made { pixels, stages, map, detector } = &mut made;
+    let Stages { frame, place, rays, depth, .. } = stages;
+    let view = View { pair: &PAIR, frame, place, rays, depth, nearest_m: 0.0 };
+    let found = detector.ground(DisparityPicture::new(pixels, 320), &view, map);
+    (found, map.table().iter().filter(|slot| detector.is_flat(Column::of(slot))).count() as u16)
+}
+
+#[test]
+fn a_plane_that_is_too_steep_or_above_the_camera_or_hardly_seen_is_none() {
+    let (world, usual) = (World::level(1.2, 12.0, 2.0), GroundSettings::default());
+    let (found, flat) = plane_under(&world, usual, 1);
+    let support = found.expect("level ground is seen").support as f32;
+    assert!(flat > 10 && support > 1000.0, "{flat} columns, {support} points");
+    assert!(plane_under(&world, usual, flat).0.is_some());
+    assert_eq!(plane_under(&world, usual, flat + 1).0, None, "one column is missing");
+    let permille = |support: f32| GroundSettings { min_support_permille: support / 76.8, ..usual };
+    assert!(plane_under(&world, permille(support - 9.0), 1).0.is_some());
+    assert_eq!(plane_under(&world, permille(support + 9.0), 1).0, None, "points are missing");
+
+    // A slope that is gentle enough for columns to be flat.
+    let mut slope = World::empty(1.2, 12.0, 0.0);
+    slope.patches.push(Patch::across(Point::new(-2.0_f64.to_radians().tan(), 0.0, 1.0), Point::zeros(), 100.0));
+    assert!(plane_under(&slope, GroundSettings { max_tilt_deg: 2.4, ..usual }, 1).0.is_some());
+    assert_eq!(plane_under(&slope, GroundSettings { max_tilt_deg: 1.6, ..usual }, 1).0, None);
+
+    let mut ceiling = World::empty(0.4, -12.0, 0.0);
+    ceiling.patches.push(ground(1.1));
+    let (found, flat) = plane_under(&ceiling, usual, 1);
+    assert!(flat > 10 && found.is_none(), "{flat} columns, {found:?}");
+}
+
+#[test]
+fn pixels_are_obstacle_or_ground_up_to_the_limits_and_at_them() {
+    let world = World::empty(1.0, 10.0, 0.0);
+    let mut made = Made::new(&world, 0.0, &mut Random::seeded("no noise", 0));
+    made.pixels.fill(DisparityPixel::from_steps(300));
+    let Made { pixels, stages, map, detector } = &mut made;
+    let Stages { frame, place, rays, depth, .. } = stages;
+    let view = View { pair: &PAIR, frame, place, rays, depth, nearest_m: 0.0 };
+    let (picture, level) = (DisparityPicture::new(pixels, 320), GroundPlane::of_mount(frame));
+    let heights: Vec<f32> =
+        (0..240).map(|y| level.height_m(row_points(picture, depth, rays, y).next().unwrap().1)).collect();
+    let mut codes = vec![9; pixels.len()];
+    for (low, high) in [(0.3, 0.9), (heights[30], heights[9]), (-heights[220], heights[2])] {
+        let settings = CostMapSettings { min_height_m: low, max_height_m: high, ..CostMapSettings::default() };
+        detector.configure(&settings, &GroundSettings::default(), 1).unwrap();
+        detector.count(picture, &view, &level, map, &mut codes);
+        for (y, &height) in heights.iter().enumerate() {
+            let expected = match height {
+                h if h >= low && h <= high => OBSTACLE,
+                h if h > -low && h < low => GROUND,
+                _ => OTHER,
+            };
+            assert_eq!(codes[y * 320], expected, "{height} m, from {low} to {high} m");
+        }
+    }
+}
+
+#[test]
+fn columns_hold_as_many_points_as_they_have_room_for() {
+    // All of the picture in one column: more points than 16 bits count.
+    let mut world = World::empty(1.0, 0.0, 0.0);
+    world.place = (0.0, 0.5, 0.0);
+    let mut made = Made::new(&world, 0.0, &mut Random::seeded("full columns", 0));
+    made.pixels.fill(DisparityPixel::from_steps(16 * 91));
+    let geometry = MapGeometry { cell_size_mm: 1000, x_first: 0, x_count: 4, y_first: -2, y_count: 4 };
+    made.map.configure(&MapSettings { geometry, ..MapSettings::default() }, (0.25, 2.2)).unwrap();
+    let Made { pixels, stages, map, detector } = &mut made;
+    let Stages { frame, place, rays, depth, .. } = stages;
+    let view = View { pair: &PAIR, frame, place, rays, depth, nearest_m: 0.0 };
+    detector.measure(DisparityPicture::new(pixels, 320), &view, map);
+    let points: Vec<u16> =
+        map.table().iter().map(|slot| Column::of(slot).points).filter(|&points| points > 0).collect();
+    assert_eq!(points, [u16::MAX]);
 }
 
 #[test]

@@ -112,3 +112,63 @@ fn planes_of_the_world_are_planes_of_disparity_and_back() {
     assert!(seen > 40, "{seen}");
     assert_eq!(DisparityPlane::default().in_world(&PAIR, &World::level(1.0, 0.0, 0.0).frame(), (0.0, 0.0)), None);
 }
+
+#[test]
+fn rounding_makes_no_plane_of_a_long_line() {
+    let mut random = Random::seeded("long lines", 0x5eed_0135);
+    for round in 0..300 {
+        let direction = loop {
+            let direction = (random.below(61) as i32 - 30, random.below(61) as i32 - 30);
+            if direction != (0, 0) {
+                break direction;
+            }
+        };
+        let from = (random.below(300) as i32 - 150, random.below(300) as i32 - 150);
+        let points: Vec<_> = (0..40 + random.below(20) as i32)
+            .map(|i| (from.0 + i * direction.0, from.1 + i * direction.1, 1 + random.below(30_000) as u16))
+            .collect();
+        assert_eq!(sums(&points).fit(), None, "round {round}: along {direction:?} from {from:?}");
+    }
+    // Two pixels, and none.
+    assert_eq!(sums(&[(3, 4, 100), (900, -700, 200)]).fit(), None);
+    // A strip that is two pixels wide and a hundred long spans a plane.
+    let strip: Vec<_> = (0..200).map(|i| (i / 2, i % 2, 500 + i as u16)).collect();
+    let (plane, squares) = sums(&strip).fit().unwrap();
+    assert!((plane.along_u - 2.0).abs() < 1.0e-3 && (plane.along_v - 1.0).abs() < 1.0e-3 && squares < 1.0e-3);
+}
+
+#[test]
+fn disparities_of_a_plane_are_those_of_the_points_that_rays_meet() {
+    let mut random = Random::seeded("rays to planes", 0x5eed_0136);
+    for round in 0..200 {
+        let mut world = World::empty(random.within(0.3, 2.5), random.within(-30.0, 40.0), random.within(-15.0, 15.0));
+        world.pair.disparity_offset_px = [0.0, -2.5, 3.0][round % 3];
+        let (pair, frame) = (&world.pair, &world.frame());
+        let normal = Point::new(random.within(-0.6, 0.6), random.within(-0.6, 0.6), 1.0).normalize();
+        // Below the camera, or above it.
+        let height = random.within(0.3, 2.0) * if round % 2 == 0 { 1.0 } else { -1.0 };
+        let down = normal.map(|n| (n * height.signum()) as f32).into();
+        let centre = (random.within(0.0, 320.0) as f32, random.within(0.0, 240.0) as f32);
+        let plane = DisparityPlane::of_ground(down, height.abs() as f32, pair, frame, centre);
+        for _ in 0..20 {
+            let (u, v) = (random.within(-100.0, 100.0), random.within(-100.0, 100.0));
+            let ray = world.direction(u + f64::from(centre.0), v + f64::from(centre.1));
+            // Infinitely far is no disparity, and behind the camera it is negative.
+            let away = -normal.dot(&ray) / height;
+            let expected = 16.0 * (228.0 * 0.2 * away - f64::from(pair.disparity_offset_px));
+            let found = f64::from(plane.steps_at(u as f32, v as f32));
+            assert!(
+                (found - expected).abs() < 2.0e-3 * (1.0 + expected.abs()),
+                "round {round}: {found}, not {expected}"
+            );
+        }
+        let (n, found) = plane.in_world(pair, frame, centre).unwrap();
+        let off = (Point::from(n.map(f64::from)) - normal).norm();
+        assert!(off < 1.0e-3 && (f64::from(found) / height - 1.0).abs() < 1.0e-3, "{n:?}, {found} m, not {height} m");
+        // The vector that is not made a unit has the same direction, or the opposite one.
+        let vector = frame.direction(plane.normal(pair, centre)).map(f64::from);
+        assert!(Point::from(vector).normalize().cross(&normal).norm() < 1.0e-3, "round {round}");
+    }
+    let at_infinity = DisparityPlane::default();
+    assert_eq!(at_infinity.in_world(&PAIR, &World::level(1.0, 0.0, 0.0).frame(), (160.0, 120.0)), None);
+}

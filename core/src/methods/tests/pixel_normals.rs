@@ -212,3 +212,139 @@ fn a_level_plane_tilted_towards_the_camera_has_the_class_of_its_angle() {
     }
     assert_eq!((PAIR.width, PAIR.height), (320, 240));
 }
+
+#[test]
+fn rows_that_are_wider_than_there_is_room_for_are_refused() {
+    let mut detector = PixelNormals::<8>::new();
+    let (settings, surfaces) = (PixelNormalSettings::default(), SurfaceSettings::default());
+    assert_eq!(detector.configure(&settings, &surfaces, 8), Ok(()));
+    let refused = detector.configure(&settings, &surfaces, 9).unwrap_err();
+    let problem = ConfigProblem::OverCapacity { needed: 9, capacity: 8 };
+    assert_eq!((refused.field, refused.problem), ("calibration.width", problem));
+}
+
+#[test]
+fn a_plane_has_the_class_of_its_angle_wherever_it_faces() {
+    let mut random = Random::seeded("angles", 0x5eed_0137);
+    let mut detector = PixelNormals::<8>::new();
+    detector.configure(&PixelNormalSettings::default(), &SurfaceSettings::default(), 8).unwrap();
+    for round in 0..400 {
+        let world = World::empty(1.0, random.within(-30.0, 40.0), random.within(-15.0, 15.0));
+        let (pair, frame) = (&world.pair, &world.frame());
+        let at = (random.within(0.0, 320.0) as f32, random.within(0.0, 240.0) as f32);
+        for (angle, class) in [
+            (0.0, HORIZONTAL),
+            (29.7, HORIZONTAL),
+            (30.3, SLANTED),
+            (44.7, SLANTED),
+            (45.3, VERTICAL),
+            (90.0, VERTICAL),
+            (150.3, HORIZONTAL),
+        ] {
+            let (sin, cos) = f64::to_radians(angle).sin_cos();
+            let (aside, ahead) = random.within(0.0, std::f64::consts::TAU).sin_cos();
+            let normal = Point::new(sin * ahead, sin * aside, cos).map(|n| n as f32).into();
+            let plane = DisparityPlane::of_ground(normal, random.within(0.5, 3.0) as f32, pair, frame, at);
+            assert_eq!(detector.class(&plane, pair, frame, at), class, "round {round}: {angle} degrees");
+        }
+    }
+    let world = World::level(1.0, 0.0, 0.0);
+    assert_eq!(detector.class(&DisparityPlane::default(), &world.pair, &world.frame(), (9.0, 9.0)), NONE);
+}
+
+#[test]
+fn pixels_without_a_class_take_that_of_the_nearest_one_on_their_surface() {
+    const SIZE: (usize, usize) = (23, 11);
+    let mut random = Random::seeded("nearest classes", 0x5eed_0138);
+    let mut taken = 0;
+    for window in [3_u16, 7, 11, 21] {
+        let mut detector = PixelNormals::<23>::new();
+        let settings = PixelNormalSettings { window, ..PixelNormalSettings::default() };
+        detector.configure(&settings, &SurfaceSettings { step_sixteenths: 16, ..Default::default() }, 23).unwrap();
+        for _ in 0..7 {
+            // Upright strips, one beside the other, whose disparities are just contiguous with the next, or just not; some have none,
+            // and small disparities lie beside those.
+            let (mut strips, mut steps, mut strip) = (vec![], vec![], 0);
+            let mut value = 1 + random.below(8) as u16;
+            while steps.len() < SIZE.0 {
+                let wide = 1 + random.below(9) as usize;
+                steps.extend((0..wide).map(|_| value));
+                strips.extend((0..wide).map(|_| strip));
+                let before = value;
+                value = match random.below(4) {
+                    0 => 0,
+                    1 => before + 17,
+                    2 if before > 17 => before - 17,
+                    _ => before.max(1) + 15 + u16::from(before > 0),
+                };
+                let apart = before == 0 || value == 0 || before.abs_diff(value) > 16;
+                strip += u16::from(apart);
+            }
+            let rare = 2 + random.below(60);
+            let mut codes: Vec<u8> = (0..SIZE.0 * SIZE.1)
+                .map(|at| match random.below(rare) {
+                    0 if steps[at % SIZE.0] != 0 => 1 + random.below(3) as u8,
+                    _ => NONE,
+                })
+                .collect();
+            let before = codes.clone();
+            let pixels: Vec<_> = (0..codes.len()).map(|at| DisparityPixel::from_bits(steps[at % SIZE.0])).collect();
+            let picture = DisparityPicture::new(&pixels, SIZE.0);
+            detector.adopt(picture, &|pixel: &DisparityPixel| pixel.steps(), &mut codes);
+            for at in 0..codes.len() {
+                let (x, y) = (at % SIZE.0, at / SIZE.0);
+                let away = |other: &usize| (other % SIZE.0).abs_diff(x) + (other / SIZE.0).abs_diff(y);
+                let beside = |other: &usize| before[*other] != NONE && strips[other % SIZE.0] == strips[x];
+                let nearest = (0..codes.len()).filter(beside).map(|other| away(&other)).min();
+                match nearest.filter(|&nearest| nearest < usize::from(window) && steps[x] != 0) {
+                    None => assert_eq!(codes[at], NONE, "({x}, {y}), window {window}"),
+                    Some(nearest) => {
+                        let class = |other: usize| before[other] == codes[at];
+                        let found = (0..codes.len()).filter(beside).filter(|other| away(other) == nearest);
+                        assert!(found.into_iter().any(class), "({x}, {y}), window {window}: {}", codes[at]);
+                        taken += usize::from(nearest > 0);
+                    }
+                }
+            }
+        }
+    }
+    assert!(taken > 1500, "{taken}");
+}
+
+#[test]
+fn classes_of_some_pixels_are_those_of_planes_fitted_around_them() {
+    let mut random = Random::seeded("some pixel normals", 0x5eed_0139);
+    let world = World::empty(1.1, 14.0, 2.0);
+    let mut counts = [0; 4];
+    for (window, min_filled_percent) in [(3, 60), (3, 0), (7, 50), (11, 70)] {
+        let settings = PixelNormalSettings { window, min_filled_percent, ..PixelNormalSettings::default() };
+        // Planes in blocks of 40 x 30 pixels, the upper part of the picture without disparities.
+        let blocks: Vec<[f64; 3]> = (0..64)
+            .map(|_| [random.within(100.0, 900.0), random.within(-2.0, 2.0), random.within(-2.0, 9.0)])
+            .collect();
+        let pixels: Vec<DisparityPixel> = (0..320 * 240)
+            .map(|at| {
+                let (x, y) = (at % 320, at / 320);
+                let [d, u, v] = blocks[y / 30 * 8 + x / 40];
+                let steps = d + u * (x % 40) as f64 + v * (y % 30) as f64 + random.within(-4.0, 4.0);
+                match y < 170 || random.below(100) < 30 {
+                    true => DisparityPixel::none(Reason::LowTexture),
+                    false => DisparityPixel::from_steps(steps.round().clamp(1.0, 1500.0) as u16),
+                }
+            })
+            .collect();
+        let codes = classes(&world, &pixels, &settings);
+        for _ in 0..150 {
+            let at = 170 * 320 + random.below(70 * 320) as usize;
+            if !pixels[at].has_value() {
+                assert_eq!(codes[at], NONE);
+                continue;
+            }
+            if let Plain::Class(class) = plain(&world, &pixels, at, &settings) {
+                assert_eq!(codes[at], class, "({}, {}), window {window}", at % 320, at / 320);
+                counts[usize::from(class)] += 1;
+            }
+        }
+    }
+    assert!(counts[1..].iter().all(|&pixels| pixels > 10), "{counts:?}");
+}

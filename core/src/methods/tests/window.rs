@@ -20,13 +20,12 @@ fn plain(steps: &[u16], (width, height): (usize, usize), (x, y): (usize, usize),
     sums
 }
 
-#[test]
-fn sliding_sums_are_the_sums_of_every_window() {
-    let mut random = Random::seeded("windows", 0x5eed_0120);
+/// Compares the sums of all windows of so many pictures for each radius; returns how many windows there were.
+fn compare(pictures: u32, most: (u32, u32), random: &mut Random) -> u32 {
     let mut windows_seen = 0;
     for radius in 1..=PixelNormalSettings::MAX_WINDOW / 2 {
-        for round in 0..12 {
-            let size = (1 + random.below(60) as usize, 1 + random.below(45) as usize);
+        for round in 0..pictures {
+            let size = (1 + random.below(most.0) as usize, 1 + random.below(most.1) as usize);
             let holes = random.below(100);
             // Every other picture holds the largest disparities that there are.
             let most = if round % 2 == 0 { 0x7fff } else { 2000 };
@@ -49,5 +48,18 @@ fn sliding_sums_are_the_sums_of_every_window() {
             }
         }
     }
-    assert!(windows_seen > 50_000, "{windows_seen}");
+    windows_seen
+}
+
+#[test]
+fn sliding_sums_are_the_sums_of_every_window() {
+    let windows = compare(12, (60, 45), &mut Random::seeded("windows", 0x5eed_0120));
+    assert!(windows > 50_000, "{windows}");
+}
+
+/// The same in little time, for whoever breaks it.
+#[test]
+fn in_small_pictures_sliding_sums_are_those_of_every_window() {
+    let windows = compare(2, (26, 26), &mut Random::seeded("small windows", 0x5eed_0134));
+    assert!(windows > 1000, "{windows}");
 }
