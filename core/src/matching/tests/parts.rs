@@ -155,6 +155,41 @@ fn high_and_narrow_windows_agree_with_the_plain_version() {
     assert!(seen.iter().any(|((_, asked, reason), times)| (*asked, *reason) == (Asked::Wide, None) && *times > 1000));
 }
 
+/// A column of the window adds as much as there is where another leaves that adds nothing: on the left it is brighter than what lies
+/// around and brighter from row to row, on the right darker and darker. What lies around repeats, so that narrow windows cannot tell.
+#[test]
+fn costs_of_high_windows_may_change_by_all_of_a_column() {
+    const SHIFT: usize = 4;
+    let mut random = Random::seeded("columns against each other", 0x5eed_0011);
+    let mut matcher = Box::new(Matcher::<WIDTH, DISPARITIES>::new());
+    let mut seen = Seen::new();
+    for (window_height, wide_window_width) in [(17, 15), (19, 13), (21, 11), (15, 17)] {
+        let repeated = || -> Vec<u8> { (0..5).map(|_| 80 + random.below(40) as u8).collect::<Vec<u8>>().repeat(20) };
+        let rows: Vec<Vec<u8>> = core::iter::repeat_with(repeated).take(40).collect();
+        let drawn = |shift: usize, column: fn(u8) -> u8| -> Grey {
+            let mut picture: Vec<Vec<u8>> = rows.iter().map(|row| row[shift..96 + shift].to_vec()).collect();
+            for (y, row) in picture.iter_mut().enumerate() {
+                (20..96).step_by(25).for_each(|x| row[x - shift] = column(y as u8));
+            }
+            picture
+        };
+        let spans = vec![(ValidSpan { start: 0, end: 96 }, ValidSpan { start: 0, end: 96 }); 40];
+        let pair = Pair { left: drawn(0, |y| 150 + 2 * y), right: drawn(SHIFT, |y| 70 - y), spans };
+        let settings = MatchSettings {
+            wide_window_width,
+            weak_texture: 1000,
+            texture: 0,
+            weak_uniqueness_percent: 100,
+            wide_uniqueness_percent: 0,
+            ..with(0, [5, window_height])
+        };
+        matcher.configure(&settings, 96, 40).unwrap();
+        let expected = Plain::new(&pair, settings).picture(&mut seen);
+        assert!(run(&mut matcher, &pair) == expected, "{window_height} rows, {wide_window_width} columns");
+    }
+    assert!(seen.iter().any(|((_, asked, reason), times)| (*asked, *reason) == (Asked::Wide, None) && *times > 2000));
+}
+
 #[test]
 fn rows_of_few_pixels_are_filtered_as_their_definition_says() {
     let mut random = Random::seeded("few pixels", 0x5eed_0008);
