@@ -123,6 +123,26 @@ fn rows_that_are_not_of_the_picture_are_left_out() {
     assert!(row == expected[(height - 1 - margin) * width..(height - margin) * width]);
 }
 
+/// Wherever narrow windows cannot tell, the wide one is asked, and says what the plain version says.
+fn assert_wide_agrees(
+    matcher: &mut Matcher<WIDTH, DISPARITIES>,
+    pair: &Pair,
+    [wide_window_width, window_height]: [u16; 2],
+    seen: &mut Seen,
+) {
+    let settings = MatchSettings {
+        wide_window_width,
+        weak_texture: 1000,
+        texture: 0,
+        weak_uniqueness_percent: 100,
+        wide_uniqueness_percent: 0,
+        ..with(0, [5, window_height])
+    };
+    matcher.configure(&settings, pair.left[0].len(), pair.left.len()).unwrap();
+    let expected = Plain::new(pair, settings).picture(seen);
+    assert!(run(matcher, pair) == expected, "{window_height} rows, {wide_window_width} columns");
+}
+
 #[test]
 fn high_and_narrow_windows_agree_with_the_plain_version() {
     let mut random = Random::seeded("high windows", 0x5eed_0007);
@@ -139,17 +159,7 @@ fn high_and_narrow_windows_agree_with_the_plain_version() {
             };
             let spans = vec![(ValidSpan { start: 0, end: 100 }, ValidSpan { start: 0, end: 100 }); 40];
             let pair = Pair { left: noise(), right: noise(), spans };
-            let settings = MatchSettings {
-                wide_window_width,
-                weak_texture: 1000,
-                texture: 0,
-                weak_uniqueness_percent: 100,
-                wide_uniqueness_percent: 0,
-                ..with(0, [5, window_height])
-            };
-            matcher.configure(&settings, 100, 40).unwrap();
-            let expected = Plain::new(&pair, settings).picture(&mut seen);
-            assert!(run(&mut matcher, &pair) == expected, "{window_height} rows, {wide_window_width} columns, {alike}");
+            assert_wide_agrees(&mut matcher, &pair, [wide_window_width, window_height], &mut seen);
         }
     }
     assert!(seen.iter().any(|((_, asked, reason), times)| (*asked, *reason) == (Asked::Wide, None) && *times > 1000));
@@ -175,17 +185,7 @@ fn costs_of_high_windows_may_change_by_all_of_a_column() {
         };
         let spans = vec![(ValidSpan { start: 0, end: 96 }, ValidSpan { start: 0, end: 96 }); 40];
         let pair = Pair { left: drawn(0, |y| 150 + 2 * y), right: drawn(SHIFT, |y| 70 - y), spans };
-        let settings = MatchSettings {
-            wide_window_width,
-            weak_texture: 1000,
-            texture: 0,
-            weak_uniqueness_percent: 100,
-            wide_uniqueness_percent: 0,
-            ..with(0, [5, window_height])
-        };
-        matcher.configure(&settings, 96, 40).unwrap();
-        let expected = Plain::new(&pair, settings).picture(&mut seen);
-        assert!(run(&mut matcher, &pair) == expected, "{window_height} rows, {wide_window_width} columns");
+        assert_wide_agrees(&mut matcher, &pair, [wide_window_width, window_height], &mut seen);
     }
     assert!(seen.iter().any(|((_, asked, reason), times)| (*asked, *reason) == (Asked::Wide, None) && *times > 2000));
 }
