@@ -54,7 +54,7 @@ impl Camera for Counting {
     }
 }
 
-/// Runs it as the usual harness would, which is not asked to: after a minute that takes memory to say that a test takes long.
+/// In place of the usual harness, which takes memory after a minute to say that a test takes long.
 fn main() {
     const NAME: &str = "frames_take_no_memory_and_it_is_noticed_if_they_do";
     let mut filters = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).peekable();
