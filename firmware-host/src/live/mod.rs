@@ -21,6 +21,8 @@ mod pair;
 mod realtime;
 mod service;
 mod settings;
+mod sight;
+mod simulation;
 mod source;
 mod watch;
 
@@ -31,6 +33,8 @@ pub use pair::{PairPlan, PairReport};
 pub(crate) use realtime::check_cpu;
 pub use service::{Systemd, stop_at_signals};
 pub use settings::{BusSettings, MAX_PAIRS, RunSettings};
+pub use sight::Sight;
+pub use simulation::simulate;
 #[cfg(not(feature = "v4l"))]
 pub(crate) use source::no_v4l;
 pub use source::{RigCamera, RigCameraError};
@@ -46,15 +50,16 @@ use std::{
 };
 
 use fencepost_core::{geometry::StereoCalibration, wire::WireConfig};
-use fencepost_hal::{camera::Camera, can::CanBus};
+use fencepost_hal::{camera::Camera, can::CanBus, clock::MonotonicClock};
 use serde::Serialize;
 
 use crate::{crew::Crew, detector, error::Failure};
 use bus::{BusLoop, BusPlan, BusShared};
 use event::Events;
 use exchange::{Bell, Place};
-use pair::PairLoop;
+use pair::{PairLoop, PairShared};
 use realtime::ThreadWishes;
+use sight::CrewedSight;
 
 /// How often the main thread says what has happened, and looks whether the others live.
 const LOOK: Duration = Duration::from_millis(50);
@@ -116,9 +121,7 @@ where
     B: CanBus<Error: Send> + Send,
 {
     let Plan { pairs, wire, settings, sector_width_deg } = plan;
-    if pairs.is_empty() || pairs.len() > MAX_PAIRS {
-        return Err(Failure::usage(format!("a rig has 1 to {MAX_PAIRS} pairs of cameras, not {}", pairs.len())));
-    }
+    check_number(&pairs)?;
     if settings.lock_memory
         && let Err(refused) = realtime::lock_memory()
     {
@@ -129,8 +132,16 @@ where
     let places: Vec<Place> = pairs.iter().map(|_| Place::new()).collect();
     let names: Vec<String> = pairs.iter().map(|pair| pair.name.clone()).collect();
     let (bell, events, progress, bus_alive) = (Bell::default(), Events::default(), Mutex::default(), AtomicU64::new(0));
-    let shared =
-        BusShared { places: &places, bell: &bell, events: &events, stop, progress: &progress, alive: &bus_alive };
+    let clock = &MonotonicClock;
+    let shared = BusShared {
+        places: &places,
+        bell: &bell,
+        events: &events,
+        stop,
+        progress: &progress,
+        alive: &bus_alive,
+        clock,
+    };
     let bus_loop = BusLoop::new(shared, bus, BusPlan { wire, settings: &settings, sector_width_deg })?;
     // Nobody starts before everybody is ready: a node must not say that it runs before it does.
     let threads = pairs.len() + 1;
@@ -169,7 +180,9 @@ where
                 start.wait();
                 match crew {
                     Some(mut crew) if !called_off.load(Ordering::Relaxed) => {
-                        PairLoop { name, camera, place, bell, events, stop, forget_ns }.run(&mut detector, &mut crew)
+                        let mut sight = CrewedSight { detector: &mut detector, crew: &mut crew };
+                        let shared = PairShared { place, bell, events, clock };
+                        PairLoop::new(name, camera, forget_ns, shared).run(&mut sight, stop)
                     }
                     _ => PairReport::default(),
                 }
@@ -247,6 +260,13 @@ where
         let pairs = pairs.into_iter().collect::<Result<_, _>>().map_err(|_| whole("a pair"))?;
         Ok(RunReport { pairs, bus, events_dropped: events.dropped() })
     })
+}
+
+fn check_number<C>(pairs: &[PairPlan<C>]) -> Result<(), Failure> {
+    if pairs.is_empty() || pairs.len() > MAX_PAIRS {
+        return Err(Failure::usage(format!("a rig has 1 to {MAX_PAIRS} pairs of cameras, not {}", pairs.len())));
+    }
+    Ok(())
 }
 
 /// When each thread was last seen to move.

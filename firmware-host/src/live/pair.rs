@@ -3,8 +3,7 @@
 use std::{
     fmt,
     sync::atomic::{AtomicBool, Ordering},
-    thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use fencepost_core::{
@@ -15,7 +14,7 @@ use fencepost_core::{
 };
 use fencepost_hal::{
     camera::{Camera, CameraError, CameraErrorKind},
-    clock::monotonic_ns,
+    clock::Clock,
 };
 use serde::Serialize;
 
@@ -23,6 +22,7 @@ use super::{
     event::{Events, Severity},
     exchange::{Bell, Place, Trouble},
     latency::{Latency, LatencySummary},
+    sight::Sight,
 };
 use crate::{crew::Crew, detector::ProgramDetector};
 
@@ -69,104 +69,128 @@ pub struct PairReport {
     pub detect: LatencySummary,
 }
 
-/// What a pair's thread works with.
-pub(super) struct PairLoop<'a, C> {
-    pub(super) name: &'a str,
-    pub(super) camera: C,
+/// What a pair's thread shares with the others.
+#[derive(Clone, Copy)]
+pub(super) struct PairShared<'a> {
     pub(super) place: &'a Place,
     pub(super) bell: &'a Bell,
     pub(super) events: &'a Events,
-    pub(super) stop: &'a AtomicBool,
-    /// Pictures farther apart than this have nothing to do with each other.
-    pub(super) forget_ns: u64,
+    pub(super) clock: &'a dyn Clock,
 }
 
-impl<C: Camera> PairLoop<'_, C> {
+/// What a pair's thread does, and what it knows from one pair of pictures to the next.
+pub(super) struct PairLoop<'a, C> {
+    shared: PairShared<'a>,
+    camera: C,
+    /// Pictures farther apart than this have nothing to do with each other.
+    forget_ns: u64,
+    last_exposure_ns: Option<u64>,
+    trouble: Option<(Trouble, u64)>,
+    delivery: Latency,
+    detect: Latency,
+    report: PairReport,
+}
+
+impl<'a, C: Camera> PairLoop<'a, C> {
+    /// Takes all the memory that it will ever need.
+    pub(super) fn new(name: &str, camera: C, forget_ns: u64, shared: PairShared<'a>) -> Self {
+        let report = PairReport { name: name.to_owned(), ..PairReport::default() };
+        let (delivery, detect) = (Latency::new(), Latency::new());
+        Self { shared, camera, forget_ns, last_exposure_ns: None, trouble: None, delivery, detect, report }
+    }
+
     /// Looks at pictures until it is told to stop or no further pictures come.
-    pub(super) fn run(mut self, detector: &mut ProgramDetector, crew: &mut Crew) -> PairReport {
-        let mut report = PairReport { name: self.name.to_string(), ..PairReport::default() };
-        let (mut delivery, mut detect) = (Latency::new(), Latency::new());
-        let mut trouble: Option<(Trouble, u64)> = None;
-        let mut last_exposure_ns = None;
-        let (place, bell) = (self.place, self.bell);
-        while !self.stop.load(Ordering::Relaxed) {
-            let called = Instant::now();
-            let result = self.camera.next_pair(|pair| {
-                let start_ns = monotonic_ns();
-                delivery.record(start_ns.saturating_sub(pair.timestamp_ns));
-                // Ground that was seen long ago may lie elsewhere by now.
-                let step_ns = last_exposure_ns.map(|last| pair.timestamp_ns.saturating_sub(last));
-                if step_ns.is_some_and(|step_ns| step_ns > self.forget_ns) {
-                    detector.forget();
-                }
-                last_exposure_ns = Some(pair.timestamp_ns);
-                crew.detect(detector, &pair.left, &pair.right, &mut ())?;
-                detect.record(monotonic_ns().saturating_sub(start_ns));
-                place.publish(pair.timestamp_ns, pair.missed, monotonic_ns(), detector.detection());
-                Ok(pair.missed)
-            });
-            place.count_alive();
-            while let Some(warning) = self.camera.take_warning() {
-                let text = format_args!("pair {}: {warning}", self.name);
-                self.events.tell(monotonic_ns(), Severity::Warning, text);
-            }
-            let found = match result {
-                Ok(None) => {
-                    place.fail(Trouble::Ended);
-                    bell.ring();
-                    break;
-                }
-                Ok(Some(Ok(missed))) => {
-                    report.frames += 1;
-                    report.missed += u64::from(missed);
-                    None
-                }
-                Ok(Some(Err(error))) => {
-                    report.damaged += 1;
-                    self.say(&mut trouble, Trouble::NotLookedAt, &NotLookedAt(error));
-                    Some(Trouble::NotLookedAt)
-                }
-                Err(error) => {
-                    let kind = error.kind();
-                    match kind {
-                        CameraErrorKind::NoPicture => report.no_picture += 1,
-                        CameraErrorKind::Damaged => report.damaged += 1,
-                        CameraErrorKind::Lost | CameraErrorKind::Unusable => report.lost += 1,
-                    }
-                    self.say(&mut trouble, Trouble::Camera(kind), &error);
-                    Some(Trouble::Camera(kind))
-                }
-            };
-            match found {
-                None => self.say_mended(&mut trouble),
-                Some(found) => place.fail(found),
-            }
-            bell.ring();
-            if found.is_some() {
-                thread::sleep(LEAST_FAILING.saturating_sub(called.elapsed()));
-            }
+    pub(super) fn run(mut self, sight: &mut impl Sight, stop: &AtomicBool) -> PairReport {
+        while !stop.load(Ordering::Relaxed)
+            && let Some(rest) = self.step(sight)
+        {
+            self.shared.clock.sleep(rest);
         }
-        report.delivery = delivery.summary();
-        report.detect = detect.summary();
-        report
+        self.end()
+    }
+
+    /// Waits for a pair of pictures and looks at it. Returns how long to wait before the next call, or `None` where no further
+    /// pictures come.
+    pub(super) fn step(&mut self, sight: &mut impl Sight) -> Option<Duration> {
+        let PairShared { place, bell, events, clock } = self.shared;
+        let called_ns = clock.now_ns();
+        let result = self.camera.next_pair(|pair| {
+            let start_ns = clock.now_ns();
+            self.delivery.record(start_ns.saturating_sub(pair.timestamp_ns));
+            // Ground that was seen long ago may lie elsewhere by now.
+            let step_ns = self.last_exposure_ns.map(|last| pair.timestamp_ns.saturating_sub(last));
+            if step_ns.is_some_and(|step_ns| step_ns > self.forget_ns) {
+                sight.forget();
+            }
+            self.last_exposure_ns = Some(pair.timestamp_ns);
+            sight.look(&pair.left, &pair.right)?;
+            self.detect.record(clock.now_ns().saturating_sub(start_ns));
+            place.publish(pair.timestamp_ns, pair.missed, clock.now_ns(), sight.seen());
+            Ok(pair.missed)
+        });
+        place.count_alive();
+        while let Some(warning) = self.camera.take_warning() {
+            let text = format_args!("pair {}: {warning}", self.report.name);
+            events.tell(clock.now_ns(), Severity::Warning, text);
+        }
+        let found = match result {
+            Ok(None) => {
+                place.fail(Trouble::Ended);
+                bell.ring();
+                return None;
+            }
+            Ok(Some(Ok(missed))) => {
+                self.report.frames += 1;
+                self.report.missed += u64::from(missed);
+                None
+            }
+            Ok(Some(Err(error))) => {
+                self.report.damaged += 1;
+                self.say(Trouble::NotLookedAt, &NotLookedAt(error));
+                Some(Trouble::NotLookedAt)
+            }
+            Err(error) => {
+                let kind = error.kind();
+                match kind {
+                    CameraErrorKind::NoPicture => self.report.no_picture += 1,
+                    CameraErrorKind::Damaged => self.report.damaged += 1,
+                    CameraErrorKind::Lost | CameraErrorKind::Unusable => self.report.lost += 1,
+                }
+                self.say(Trouble::Camera(kind), &error);
+                Some(Trouble::Camera(kind))
+            }
+        };
+        match found {
+            None => self.say_mended(),
+            Some(found) => place.fail(found),
+        }
+        bell.ring();
+        let took = Duration::from_nanos(clock.now_ns().saturating_sub(called_ns));
+        Some(found.map_or(Duration::ZERO, |_| LEAST_FAILING.saturating_sub(took)))
+    }
+
+    /// Sums up.
+    pub(super) fn end(self) -> PairReport {
+        PairReport { delivery: self.delivery.summary(), detect: self.detect.summary(), ..self.report }
     }
 
     /// Says trouble when it begins or changes, not with every picture.
-    fn say(&self, known: &mut Option<(Trouble, u64)>, found: Trouble, what: &dyn fmt::Display) {
-        let now_ns = monotonic_ns();
-        if known.is_none_or(|(before, _)| before != found) {
-            self.events.tell(now_ns, Severity::Warning, format_args!("pair {}: {what}", self.name));
+    fn say(&mut self, found: Trouble, what: &dyn fmt::Display) {
+        let now_ns = self.shared.clock.now_ns();
+        if self.trouble.is_none_or(|(before, _)| before != found) {
+            let text = format_args!("pair {}: {what}", self.report.name);
+            self.shared.events.tell(now_ns, Severity::Warning, text);
         }
-        let since_ns = known.map_or(now_ns, |(_, since_ns)| since_ns);
-        *known = Some((found, since_ns));
+        let since_ns = self.trouble.map_or(now_ns, |(_, since_ns)| since_ns);
+        self.trouble = Some((found, since_ns));
     }
 
-    fn say_mended(&self, known: &mut Option<(Trouble, u64)>) {
-        if let Some((_, since_ns)) = known.take() {
-            let now_ns = monotonic_ns();
+    fn say_mended(&mut self) {
+        if let Some((_, since_ns)) = self.trouble.take() {
+            let now_ns = self.shared.clock.now_ns();
             let seconds = now_ns.saturating_sub(since_ns) as f64 * 1.0e-9;
-            let text = format_args!("pair {}: pictures again after {seconds:.1} s", self.name);
-            self.events.tell(now_ns, Severity::Note, text);
+            let text = format_args!("pair {}: pictures again after {seconds:.1} s", self.report.name);
+            self.shared.events.tell(now_ns, Severity::Note, text);
         }
     }
 }

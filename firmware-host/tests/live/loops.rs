@@ -2,21 +2,22 @@
 
 use std::{path::Path, time::Duration};
 
-use fencepost::live::RunSettings;
+use fencepost::live::{self, Plan, RunSettings};
 use fencepost_core::{
     geometry::Mount,
-    wire::{Message, NodeState},
+    wire::{Message, NodeState, WireConfig},
 };
 use fencepost_hal::{
-    camera::{Camera, StereoPair},
-    can::{CanFrame, VirtualBus},
+    camera::{Camera, MemoryCamera, StereoPair},
+    can::{CanBus, CanFrame, VirtualBus},
+    clock::{Clock, VirtualClock},
     recording::{Recording, RecordingWriter},
     scene::Scene,
 };
 
 use crate::{
     listener::{Listener, address, now_ns},
-    rig::{OrderedCamera, memory, options, pair, patient, start},
+    rig::{OrderedCamera, memory, options, pair, patient, start, take_turn},
 };
 
 /// A frame without what depends on the time at which it was sent: the age in a header, and the checksum over it.
@@ -59,6 +60,36 @@ fn a_live_rig_says_what_replay_writes_for_the_same_pictures() {
     for threads_per_pair in [1, 2] {
         live_is_as_replayed(&recording, &replayed, threads_per_pair);
     }
+    simulated_is_as_replayed(&recording, &replayed);
+}
+
+/// In virtual time the loop says the same, at the times at which it is due.
+fn simulated_is_as_replayed(recording: &Path, replayed: &[(u32, Vec<u8>)]) {
+    let options = options(256, 192, 5);
+    let bus = VirtualBus::new(10_000);
+    let mut listener = bus.attach();
+    let recorded = Recording::open(recording).unwrap();
+    let (calibration, mount) = (recorded.calibration.stereo, recorded.mount);
+    let memory = MemoryCamera::fill(&mut recorded.into_camera());
+    let mut plan = pair("front", memory, &options, mount);
+    plan.calibration = calibration;
+    let plan = Plan { pairs: vec![plan], wire: WireConfig::default(), settings: patient(), sector_width_deg: 5.0 };
+    let pace = Duration::from_millis(100);
+    let _turn = take_turn();
+    let clock = VirtualClock::new(0);
+    let mut detector = fencepost::detector::lock();
+    detector.configure(&plan.pairs[0].settings, &plan.pairs[0].calibration, &mount).unwrap();
+    let sights = std::slice::from_mut(&mut *detector);
+    let report = live::simulate(plan, sights, bus.attach(), &clock, |_| pace, |event| println!("{event:?}")).unwrap();
+    assert_eq!((report.bus.scans, report.bus.overtaken, report.bus.sent.whole_scans), (5, 0, 5), "{report:?}");
+    let frames: Vec<_> = std::iter::from_fn(|| listener.receive().unwrap()).collect();
+    let (times, scans): (Vec<_>, Vec<_>) =
+        frames.iter().filter(|(_, frame)| is_of_a_scan(frame)).map(|(at_ns, frame)| (*at_ns, timeless(frame))).unzip();
+    assert_eq!(scans, replayed);
+    let mut times: Vec<u64> = times.iter().map(|at_ns| at_ns / 1_000_000).collect();
+    times.dedup();
+    assert_eq!(times, [100, 200, 300, 400, 500], "a step takes no time");
+    assert_eq!(clock.now_ns(), 600_000_000, "the camera ends when the next picture would be due");
 }
 
 fn live_is_as_replayed(recording: &Path, replayed: &[(u32, Vec<u8>)], threads_per_pair: u8) {
@@ -67,7 +98,7 @@ fn live_is_as_replayed(recording: &Path, replayed: &[(u32, Vec<u8>)], threads_pe
     let mut listener = Listener::on(&bus);
     let recorded = Recording::open(recording).unwrap();
     let (calibration, mount) = (recorded.calibration.stereo, recorded.mount);
-    let memory = fencepost_hal::camera::MemoryCamera::fill(&mut recorded.into_camera());
+    let memory = MemoryCamera::fill(&mut recorded.into_camera());
     // Slow enough for every pair to be sent before the next is seen, whatever else the machine does.
     let camera = fencepost_hal::camera::PacedCamera::new(memory, Some(Duration::from_millis(300)));
     let mut plan = pair("front", camera, &options, mount);

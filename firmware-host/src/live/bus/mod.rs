@@ -24,7 +24,7 @@ use fencepost_core::{
 };
 use fencepost_hal::{
     can::{BusCondition, BusError, BusErrorKind, CanBus, Pump, Transmitter},
-    clock::monotonic_ns,
+    clock::Clock,
 };
 use heapless::Vec as FixedVec;
 
@@ -84,6 +84,7 @@ pub(super) struct BusShared<'a> {
     pub(super) stop: &'a AtomicBool,
     pub(super) progress: &'a Mutex<Progress>,
     pub(super) alive: &'a AtomicU64,
+    pub(super) clock: &'a dyn Clock,
 }
 
 /// The bus thread.
@@ -148,7 +149,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
         let BusPlan { wire, settings, .. } = plan;
         let encoder = ScanEncoder::new(wire).map_err(|error| Failure::config(error, None))?;
         let ns = |ms: u32| u64::from(ms) * 1_000_000;
-        let now_ns = monotonic_ns();
+        let now_ns = shared.clock.now_ns();
         let status = Status { state: NodeState::Starting, health: Health::default(), last_scan: None };
         Ok(Self {
             encoder: Box::new(encoder),
@@ -184,36 +185,54 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
 
     /// Works until it is told to stop, or until no pair will see anything any more.
     pub(super) fn run(mut self) -> BusReport {
-        // The first word is that it starts, also where this thread comes so late that pictures were seen already.
-        let now_ns = monotonic_ns();
+        self.begin();
+        while let Some(longest) = self.step() {
+            self.shared.bell.wait(longest);
+        }
+        self.end()
+    }
+
+    /// The first word is that it starts, also where this thread comes so late that pictures were seen already.
+    pub(super) fn begin(&mut self) {
+        let now_ns = self.now_ns();
         self.judge(now_ns);
         self.heartbeat_if_due(now_ns);
         // A heartbeat that waits gives way to a newer one. What becomes of it is looked at with the next.
         let _ = self.pump();
-        loop {
-            let stopping = self.shared.stop.load(Ordering::Relaxed);
-            let now_ns = monotonic_ns();
-            self.listen(now_ns);
-            self.collect(now_ns);
-            let waiting = self.wait_for_others(now_ns);
-            if self.first_fresh_ns.is_some() && waiting.is_none() && !self.is_busy(now_ns) {
-                self.scan(now_ns);
-            }
-            self.judge(now_ns);
-            self.heartbeat_if_due(now_ns);
-            let pump = self.pump();
-            self.tell_progress();
-            self.shared.alive.fetch_add(1, Ordering::Relaxed);
-            let ended = self.pairs().all(|pair| pair.trouble == Some(Trouble::Ended) && !pair.fresh);
-            if stopping || ended {
-                break;
-            }
-            let until_heartbeat = Duration::from_nanos(self.next_heartbeat_ns.saturating_sub(monotonic_ns()));
-            let longest = if pump.waiting > 0 { RETRY } else { LISTEN };
-            self.shared.bell.wait(longest.min(until_heartbeat).min(waiting.unwrap_or(LISTEN)));
+    }
+
+    /// Does what there is to do now. Returns how long it can wait for the bell, or `None` where nothing more is to come.
+    pub(super) fn step(&mut self) -> Option<Duration> {
+        let stopping = self.shared.stop.load(Ordering::Relaxed);
+        let now_ns = self.now_ns();
+        self.listen(now_ns);
+        self.collect(now_ns);
+        let waiting = self.wait_for_others(now_ns);
+        if self.first_fresh_ns.is_some() && waiting.is_none() && !self.is_busy(now_ns) {
+            self.scan(now_ns);
         }
+        self.judge(now_ns);
+        self.heartbeat_if_due(now_ns);
+        let pump = self.pump();
+        self.tell_progress();
+        self.shared.alive.fetch_add(1, Ordering::Relaxed);
+        let ended = self.pairs().all(|pair| pair.trouble == Some(Trouble::Ended) && !pair.fresh);
+        if stopping || ended {
+            return None;
+        }
+        let until_heartbeat = Duration::from_nanos(self.next_heartbeat_ns.saturating_sub(self.now_ns()));
+        let longest = if pump.waiting > 0 { RETRY } else { LISTEN };
+        Some(longest.min(until_heartbeat).min(waiting.unwrap_or(LISTEN)))
+    }
+
+    /// Says that nothing more will come, and sums up.
+    pub(super) fn end(mut self) -> BusReport {
         self.farewell();
         self.finish()
+    }
+
+    fn now_ns(&self) -> u64 {
+        self.shared.clock.now_ns()
     }
 
     fn pairs(&self) -> impl Iterator<Item = &PairState> {
@@ -391,7 +410,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
     }
 
     fn pump(&mut self) -> Pump {
-        let now_ns = monotonic_ns();
+        let now_ns = self.now_ns();
         let pump = self.transmitter.pump(now_ns);
         match pump.trouble {
             None => self.full_since_ns = None,
@@ -443,7 +462,7 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
             progress.health = self.status.health;
             progress.speed_m_s = self
                 .commands
-                .vehicle_motion(monotonic_ns())
+                .vehicle_motion(self.now_ns())
                 .and_then(|motion| motion.speed_mm_per_s)
                 .map(|speed| f32::from(speed) * 1.0e-3);
         }
@@ -453,14 +472,14 @@ impl<'a, B: CanBus> BusLoop<'a, B> {
     fn farewell(&mut self) {
         self.drain();
         self.status.state = NodeState::Stopping;
-        self.heartbeat(monotonic_ns());
+        self.heartbeat(self.now_ns());
         self.drain();
     }
 
     fn drain(&mut self) {
-        let end_ns = monotonic_ns().saturating_add(FAREWELL_NS);
-        while self.pump().waiting > 0 && monotonic_ns() < end_ns {
-            std::thread::sleep(RETRY);
+        let end_ns = self.now_ns().saturating_add(FAREWELL_NS);
+        while self.pump().waiting > 0 && self.now_ns() < end_ns {
+            self.shared.clock.sleep(RETRY);
         }
     }
 
