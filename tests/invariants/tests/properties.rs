@@ -66,7 +66,7 @@ properties! {
     recording: 500,
     rig: 500,
     pixels: 3000,
-    live: 12,
+    live: 3000,
 }
 
 #[cfg(not(feature = "host"))]
