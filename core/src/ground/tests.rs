@@ -218,6 +218,63 @@ fn ground_at_another_height_than_that_of_the_mount_is_large_and_the_lowest() {
 }
 
 #[test]
+fn what_is_large_and_near_and_cannot_be_ground_does_not_keep_others_from_being_tried() {
+    // The floor is far away. Of two tables before it the nearer one weighs the most of all three, but too few pixels lie on either.
+    let mut world = World::empty(1.2, 20.0, 0.0);
+    world.patches.push(Patch::new([8.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 30.0, 0.0]));
+    world.patches.push(Patch::new([1.7, 0.0, 0.6], [0.1, 0.0, 0.0], [0.0, 0.2, 0.0]));
+    world.patches.push(Patch::new([1.1, 0.0, 0.3], [0.2, 0.0, 0.0], [0.0, 0.3, 0.0]));
+    let mount = Mount { height_m: None, ..world.mount() };
+    let support = |permille| GroundSettings { min_support_permille: permille, ..GroundSettings::default() };
+    for (permille, height_m) in [(100.0, 1.2), (0.0, 0.9)] {
+        let plane = find(&world, &mount, &support(permille)).expect("a plane");
+        assert!((plane.camera_height_m - height_m).abs() < 0.02, "{permille} permille: {plane:?}");
+    }
+    world.patches.remove(0);
+    assert_eq!(find(&world, &mount, &support(100.0)), None, "the tables alone");
+}
+
+#[test]
+fn the_terrain_is_trimmed_by_what_an_error_of_a_disparity_makes_of_heights() {
+    let pair = crate::test_world::PAIR;
+    for height_m in [0.5, 1.2] {
+        let mut world = World::level(height_m, 25.0, 0.0);
+        let mut random = Random::seeded("boxes", 0x5eed_0137);
+        for _ in 0..12 {
+            let (x, y, top) = (random.within(1.5, 6.0), random.within(-2.0, 2.0), random.within(0.05, 0.3));
+            world.add_box([x, y, 0.0], [x + 0.5, y + 0.5, top], 0.0);
+        }
+        let settings = GroundSettings { terrain_noise_px: 2.0, ..GroundSettings::default() };
+        let mut stages = stages(&world.mount(), &settings);
+        let pixels = world.render();
+        let plane = stages.ground(&pixels).expect("the floor");
+        // Ground `x` ahead has the disparity `fb / x`; with two pixels less of it it would lie `2 x^2 / fb` farther away, and by
+        // `camera height / x` of that lower.
+        let tolerance_per_m = 2.0 * plane.camera_height_m / (pair.focal_px * pair.baseline_m);
+        let fit = |tolerance_per_m| {
+            let bend = Bend {
+                patch_m: settings.terrain_patch_m,
+                share: settings.terrain_share,
+                max_slope: settings.terrain_max_slope_deg.to_radians().tan(),
+                tolerance_m: settings.surface_tolerance_m,
+                tolerance_per_m,
+            };
+            let mut terrain = Terrain::new();
+            let picture = DisparityPicture::new(&pixels, 320);
+            let geometry = (&stages.depth, &stages.rays);
+            terrain.fit(plane, &stages.surfaces, picture, geometry, &bend, Chosen::PLAIN);
+            core::array::from_fn::<f32, 60, _>(|i| terrain.lift_m(1.0 + 0.1 * i as f32, 0.0))
+        };
+        let [truth, half, twice] = [1.0, 0.5, 2.0].map(|factor| fit(factor * tolerance_per_m));
+        let found = core::array::from_fn::<f32, 60, _>(|i| stages.ground.terrain().lift_m(1.0 + 0.1 * i as f32, 0.0));
+        let off = |other: [f32; 60]| found.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        std::println!("{height_m} m: {} m off, {} with half of it, {} with twice", off(truth), off(half), off(twice));
+        assert!(off(truth) < 1.0e-4, "{height_m} m");
+        assert!(off(half) > 1.0e-3 && off(twice) > 1.0e-3, "{height_m} m: it does not matter there");
+    }
+}
+
+#[test]
 fn settings_that_cannot_be_are_named() {
     let good = GroundSettings::default();
     let field = |settings: GroundSettings| settings.check().unwrap_err().field;

@@ -93,33 +93,47 @@ fn pictures_have_the_size_that_their_calibration_says_and_no_row_below_it() {
     assert_eq!(out, [0; 70]);
 }
 
+/// A rectifier of cameras that are the rectified ones already, without a lens.
+fn unchanged<const NODES: usize>(pair: RectifiedPair) -> Box<Rectifier<NODES>> {
+    let RectifiedPair { width, height, focal_px, cx, cy, .. } = pair;
+    let ideal = CameraModel { width, height, fx: focal_px, fy: focal_px, cx, cy, distortion: Distortion::default() };
+    let rotation = turned([0.0; 3]);
+    let rectification = Some(Rectification { left_rotation: rotation, right_rotation: rotation, pair });
+    let raw = RawPair { left: ideal, right: ideal, rotation, translation_m: [-0.1, 0.0, 0.0], rectification };
+    let mut rectifier = Box::new(Rectifier::new());
+    rectifier.configure(&StereoCalibration::Raw(raw)).unwrap();
+    rectifier
+}
+
 /// Where raw and rectified camera are the same, every pixel keeps its value, those of the last row and column too.
 #[test]
 fn the_same_camera_gives_the_same_picture() {
-    let ideal = CameraModel {
-        width: 64,
-        height: 48,
-        fx: 300.0,
-        fy: 300.0,
-        cx: 31.5,
-        cy: 23.5,
-        distortion: Distortion::default(),
-    };
-    let rotation = turned([0.0; 3]);
-    let raw = RawPair {
-        left: ideal,
-        right: ideal,
-        rotation,
-        translation_m: [-0.1, 0.0, 0.0],
-        rectification: Some(Rectification { left_rotation: rotation, right_rotation: rotation, pair: plain(64, 48) }),
-    };
-    let rectifier = rectifier(&StereoCalibration::Raw(raw));
+    let rectifier = unchanged::<GRID>(plain(64, 48));
     let pixels = noise(&mut Random::seeded("rectification", SEED), 64 * 48);
     let picture = Picture::packed(&pixels, 64, 48).unwrap();
     let mut out = [0; 64];
     for y in 0..48 {
         assert_eq!(rectifier.row(Side::Left, &picture, y, &mut out), 0..64, "row {y}");
         assert_eq!(out, picture.row(y), "row {y}");
+    }
+}
+
+/// So it is where the lens ends, at eight focal lengths, before it comes to the middle of the picture, from which the plane of the
+/// map is taken: far from the origin, where nodes hold the way from a plane and not that from the origin.
+#[test]
+fn a_picture_whose_middle_shows_nothing_is_the_same_elsewhere() {
+    let (width, height, first) = (1280, 48, 1100 - 8 * 40);
+    let rectifier =
+        unchanged::<{ grid_nodes(1280, 48) }>(RectifiedPair { focal_px: 40.0, cx: 1100.0, ..plain(1280, 48) });
+    assert_eq!(rectifier.source_of(Side::Left, 640.0, 24.0), None);
+    let pixels = noise(&mut Random::seeded("rectification", SEED), width * height);
+    let picture = Picture::packed(&pixels, width, height).unwrap();
+    let mut out = [0; 1280];
+    for y in 0..height {
+        let span = rectifier.row(Side::Left, &picture, y, &mut out);
+        // Between nodes of which one lies beyond the lens there is no place.
+        assert!((first..first + 2 * STEP).contains(&span.start) && span.end == width, "row {y}: {span:?}");
+        assert_eq!(out[span.clone()], picture.row(y)[span], "row {y}");
     }
 }
 
