@@ -124,6 +124,14 @@ mod tests {
         }
     }
 
+    #[test]
+    fn of_more_than_there_is_room_for_the_first_are_kept() {
+        for count in [0, 1, MAX_BANDS - 1, MAX_BANDS, MAX_BANDS + 1, 1000] {
+            let kept = collected(0..count);
+            assert!(kept.iter().copied().eq(0..count.min(MAX_BANDS)), "{count}: {kept:?}");
+        }
+    }
+
     struct Count<'a>(&'a mut u32);
 
     impl Work for Count<'_> {

@@ -1,5 +1,7 @@
 //! Numbers that all backends work with, against their meaning; and what no backend may touch.
 
+mod slices;
+
 use std::{string::String, vec, vec::Vec};
 
 use super::*;
@@ -184,71 +186,19 @@ fn sums_and_what_is_weak_are_those_of_the_columns_under_the_window() {
     }
 }
 
-/// Every backend reads and writes through pointers, so each looks whether all of that lies in the slices: what is too short by one is
-/// refused.
+/// Where no right pixel can hold a window, nothing is decided, and what was decided before stays.
 #[test]
-#[cfg(target_arch = "x86_64")]
-fn searches_beyond_the_slices_are_refused() {
-    use std::panic::{AssertUnwindSafe, catch_unwind};
-
-    /// Sizes of a search, all just enough for `range` up to 20, and the right tables' lead.
-    #[derive(Clone)]
-    struct Sizes {
-        search: Search,
-        columns: usize,
-        work: usize,
-        tables: [usize; 2],
-        lead: usize,
-    }
-
-    // More memory than any of it says, so that nothing else is touched by what is not refused.
-    let (columns, mut found) = (vec![0; 8192], Found::new());
-    let mut rooms = [vec![0_i16; 4096], vec![0; 4096], vec![0; 4096]];
-    let mut refused = |sizes: &Sizes| {
-        let [work, even, odd] = &mut rooms;
-        let right = Right { tables: [&mut even[..sizes.tables[0]], &mut odd[..sizes.tables[1]]], lead: sizes.lead };
-        let job = CostJob {
-            search: &sizes.search,
-            columns: &columns[..sizes.columns],
-            work: &mut work[..sizes.work],
-            right: Some(right),
-            found: &mut found,
-        };
-        let chosen = Chosen::new(Backend::Sse2).unwrap();
-        catch_unwind(AssertUnwindSafe(|| search_bytes(chosen, job))).is_err()
-    };
-    let good = Sizes { search: search(10..20), columns: 22 * 16, work: 16 + 32, tables: [20 + 16; 2], lead: 15 };
-    assert!(!refused(&good));
-    let ends = |range: core::ops::Range<usize>| Sizes {
-        columns: (range.end + 2) * 16,
-        tables: [range.end + 16; 2],
-        search: search(range),
-        ..good.clone()
-    };
-    assert!(!refused(&ends(3..67)), "the first pixel with a window, and as many as a chunk has");
-    for (what, bad) in [
-        ("more pixels than a chunk has", ends(3..68)),
-        ("a window that begins before the row", ends(2..20)),
-        ("columns", Sizes { columns: good.columns - 1, ..good.clone() }),
-        ("room for sums", Sizes { work: good.work - 1, ..good.clone() }),
-        ("a table", Sizes { tables: [35, 36], ..good.clone() }),
-        ("the other table", Sizes { tables: [36, 35], ..good.clone() }),
-        ("lead", Sizes { lead: 14, ..good.clone() }),
-        (
-            "a part of a vector",
-            Sizes {
-                search: Search { stride: 24, ..good.search.clone() },
-                columns: 22 * 24,
-                work: 24 + 32,
-                tables: [20 + 24; 2],
-                ..good.clone()
-            },
-        ),
-        (
-            "fewer sums than disparities",
-            Sizes { search: Search { disparities: 17, ..good.search.clone() }, lead: 16, ..good.clone() },
-        ),
-    ] {
-        assert!(refused(&bad) == cfg!(debug_assertions), "{what}");
+fn without_right_pixels_nothing_is_decided() {
+    let decide =
+        Decide { min_texture: 0, max_saturated: 9, weak_texture: 0, only_weak: false, unique: [false; 2], keys: false };
+    for (right_end, decides) in [(30, true), (2, false), (0, false)] {
+        let search = Search { right_end, ..search(20..30) };
+        let before = DisparityPixel::none(Reason::NotUnique);
+        let (mut out, mut weak) = (vec![before; 10], vec![true; 10]);
+        let mut found = Found::new();
+        found.place.fill(5);
+        decide.run(&search, &found, &Sums::new(), &mut out, &mut weak);
+        assert_eq!(out.iter().any(|pixel| *pixel != before), decides, "up to {right_end}");
+        assert!(decides || weak == [true; 10], "up to {right_end}");
     }
 }

@@ -109,6 +109,15 @@ mod tests {
     }
 
     #[test]
+    fn signals_of_no_bits_or_more_than_24_are_refused() {
+        extern crate std;
+        for size in 0..=u8::MAX {
+            let made = std::panic::catch_unwind(|| Signal::new(0, size));
+            assert_eq!(made.is_ok(), (1..=24).contains(&size), "{size} bits");
+        }
+    }
+
+    #[test]
     fn signed_values_keep_their_sign_and_saturate() {
         let signal = Signal::new(31, 7);
         for value in -64..=63 {

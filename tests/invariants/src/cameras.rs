@@ -37,7 +37,7 @@ thread_local! {
     }));
 }
 
-/// A wall with a texture that moves up from moment to moment, and what is wrong with the view of it.
+/// A wall, or the ground, with a texture that moves up from moment to moment, and what is wrong with the view of it.
 struct Scene {
     seed: u32,
     grain: usize,
@@ -78,9 +78,12 @@ impl Scene {
         let top = 64 + self.speed * moment.saturating_sub(self.late[side]) + self.lower * seen;
         for y in top..top + HEIGHT {
             let row = self.noise(y / 2, 1000) / 2;
+            let sixteenths = if seen == 1 { self.sixteenths(y - top) } else { 0 };
+            let texture = |at: usize| u32::from(self.noise(y / self.grain, at / self.grain) / 2);
             for x in 0..WIDTH {
-                let at = x + if seen == 1 { self.disparity } else { 0 };
-                picture.push(row + self.noise(y / self.grain, at / self.grain) / 2);
+                let (at, beyond) = (x + sixteenths / 16, (sixteenths % 16) as u32);
+                let grey = (texture(at) * (16 - beyond) + texture(at + 1) * beyond) / 16;
+                picture.push(row + grey as u8);
             }
         }
         if let Some((_, columns, grey)) = self.covered.filter(|(which, ..)| *which == side) {
@@ -91,6 +94,17 @@ impl Scene {
                 *grey = if how & 1 == 0 { *grey >> (how % 8) } else { grey.saturating_add(how) };
             }
         }
+    }
+
+    /// Disparity of a row: that of a wall, or of the ground that the mount promises.
+    fn sixteenths(&self, y: usize) -> usize {
+        let is_ground = self.seed % 8 == 7;
+        if !is_ground {
+            return 16 * self.disparity;
+        }
+        // From 1 m high, 20 degrees down: with 70 px of focal length and 0.1 m between the cameras.
+        let down = 20_f32.to_radians().sin() + (y as f32 - 32.0) / 70.0 * 20_f32.to_radians().cos();
+        (16.0 * 7.0 * down).max(0.0) as usize
     }
 
     fn noise(&self, y: usize, x: usize) -> u8 {

@@ -5,7 +5,7 @@ use fencepost_core::{
     disparity::DisparityPicture,
     geometry::Mount,
     health::{Health, HealthLevel, HealthReason},
-    map::{Cell, CellState, Doubt, SECTOR_CLEAR_DM, SECTOR_COUNT},
+    map::{Cell, CellState, Doubt, ObstacleMap, SECTOR_CLEAR_DM, SECTOR_COUNT, SectorDistances},
     methods::DetectorKind,
     surfaces::{Surface, SurfaceClass, SurfaceSettings},
 };
@@ -30,7 +30,7 @@ pub(crate) fn check(detector: &Small, camera: &Camera, judged: bool) {
     check_ground(found, camera, picture);
     check_obstacles(found, camera);
     check_cells(detector, found, camera, picture);
-    check_sectors(found);
+    check_sectors(&found.map, &found.sectors);
     if judged {
         check_health(&found.health, found);
     } else {
@@ -216,16 +216,15 @@ fn check_evidence(detector: &Small, found: &Found, camera: &Camera, picture: Dis
     }
 }
 
-fn check_sectors(found: &Found) {
-    let sectors = &found.sectors;
+pub(crate) fn check_sectors(map: &ObstacleMap<CELLS>, sectors: &SectorDistances) {
     let mut clear = [false; SECTOR_COUNT];
-    for (index, cell) in found.map.cells.iter().enumerate() {
+    for (index, cell) in map.cells.iter().enumerate() {
         // Of those that are not known nothing is said.
         if !matches!(cell.state, CellState::Free | CellState::Obstacle) {
             continue;
         }
-        let (i, j) = found.map.geometry.cell_at(index);
-        let (x, y) = found.map.geometry.centre_m(i, j);
+        let (i, j) = map.geometry.cell_at(index);
+        let (x, y) = map.geometry.centre_m(i, j);
         let (x, y) = (f64::from(x), f64::from(y));
         let place = (f64::from(sectors.left_deg) - y.atan2(x).to_degrees()) / f64::from(sectors.width_deg);
         // At the edge rounding decides.

@@ -17,6 +17,7 @@ mod frames;
 mod live;
 mod matchers;
 mod pairs;
+mod parts;
 #[cfg(feature = "host")]
 mod pixels;
 mod receiver;

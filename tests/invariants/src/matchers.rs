@@ -72,7 +72,13 @@ pub(crate) fn check(source: &mut Source<'_>) {
         }
         pictures.iter_mut().for_each(Vec::clear);
         draw(source, size, pictures);
-        let spans = sides.map(|(first, last)| ValidSpan::from(first..size.0 - last));
+        let mut spans = sides.map(|(first, last)| ValidSpan::from(first..size.0 - last));
+        // A picture of which nothing is valid, on one side.
+        match source.byte() {
+            254 => spans[0] = ValidSpan::from(0..0),
+            255 => spans[1] = ValidSpan::from(9..9),
+            _ => {}
+        }
         for (matcher, found) in [plain, other].into_iter().zip(&mut *found) {
             run(matcher, size, pictures, spans, found);
         }

@@ -18,7 +18,7 @@ use fencepost_core::{
 use crate::{
     Source,
     camera::{CELLS, Camera, draw},
-    cameras, settings, values,
+    cameras, parts, settings, values,
 };
 
 /// Runs one input.
@@ -37,6 +37,10 @@ pub fn run(bytes: &[u8]) {
         5 => values::check_places(&mut source),
         6 => values::check_reasons(&mut source),
         _ => check_stages(&mut source),
+    }
+    // What is left goes to what was written later: inputs that were found before keep their meaning.
+    if !source.is_empty() {
+        parts::check(&mut source);
     }
 }
 

@@ -145,7 +145,29 @@ pub(super) fn compiled(chosen: Chosen, steps: impl Steps) {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::is_x86_feature_detected as has;
+
     use super::*;
+
+    #[test]
+    fn what_is_available_is_what_the_standard_library_finds() {
+        let avx2 = has!("avx2") && has!("bmi1") && has!("bmi2");
+        let before = has!("f16c") && has!("fma") && has!("popcnt");
+        let avx512 = has!("avx512f") && has!("avx512bw") && has!("avx512vl") && has!("avx512bitalg");
+        for (backend, expected) in [
+            (Backend::Plain, true),
+            (Backend::Sse2, true),
+            (Backend::Sse41, has!("ssse3") && has!("sse4.1")),
+            (Backend::Avx2, avx2),
+            (Backend::Avx512, avx2 && before && avx512),
+            (Backend::Neon, false),
+            (Backend::Dsp, false),
+        ] {
+            assert_eq!(is_available(backend), expected, "{}", backend.name());
+        }
+    }
 
     #[test]
     fn a_backend_needs_all_of_its_features() {
