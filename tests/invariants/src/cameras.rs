@@ -37,7 +37,7 @@ thread_local! {
     }));
 }
 
-/// A wall, or the ground, with a texture that moves up from moment to moment, and what is wrong with the view of it.
+/// A wall, the ground or rails, with a texture that moves up from moment to moment, and what is wrong with the view of it.
 struct Scene {
     seed: u32,
     grain: usize,
@@ -96,15 +96,18 @@ impl Scene {
         }
     }
 
-    /// Disparity of a row: that of a wall, or of the ground that the mount promises.
+    /// Disparity of a row: that of a wall, of the ground that the mount promises, or of rails, which are more surfaces than there is
+    /// room for.
     fn sixteenths(&self, y: usize) -> usize {
-        let is_ground = self.seed % 8 == 7;
-        if !is_ground {
-            return 16 * self.disparity;
+        match self.seed % 8 {
+            7 => {
+                // From 1 m high, 20 degrees down: with 70 px of focal length and 0.1 m between the cameras.
+                let down = 20_f32.to_radians().sin() + (y as f32 - 32.0) / 70.0 * 20_f32.to_radians().cos();
+                (16.0 * 7.0 * down).max(0.0) as usize
+            }
+            6 => 16 * (1 + 3 * (y / 8 % 2)),
+            _ => 16 * self.disparity,
         }
-        // From 1 m high, 20 degrees down: with 70 px of focal length and 0.1 m between the cameras.
-        let down = 20_f32.to_radians().sin() + (y as f32 - 32.0) / 70.0 * 20_f32.to_radians().cos();
-        (16.0 * 7.0 * down).max(0.0) as usize
     }
 
     fn noise(&self, y: usize, x: usize) -> u8 {

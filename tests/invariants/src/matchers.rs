@@ -14,8 +14,8 @@ use crate::{
     settings,
 };
 
-const WIDTH: usize = 112;
-const DISPARITIES: usize = 80;
+const WIDTH: usize = 192;
+const DISPARITIES: usize = 96;
 
 type Wide = Matcher<WIDTH, DISPARITIES>;
 
@@ -37,12 +37,13 @@ thread_local! {
 
 /// Pictures that are just high enough for a few rows under the window, with both.
 pub(crate) fn check(source: &mut Source<'_>) {
-    let any = 8 + source.below(DISPARITIES - 7) as u16;
+    let any = 8 + source.below(73) as u16;
     let mut settings =
         MatchSettings { disparities: source.one_of(&[16, 32, 48, 64, 80, any]), ..settings::matching(source) };
-    // Now and then one that is refused: windows without a middle, more disparities than there is room for.
+    // Now and then more disparities, and one that is refused: windows without a middle, more disparities than there is room for.
     match source.byte() {
-        0..240 => {}
+        0..232 => {}
+        232..240 => settings.disparities = DISPARITIES as u16,
         240..250 => {
             (settings.window_width, settings.window_height) = source.one_of(&[(21, 21), (17, 5), (9, 17), (21, 15)]);
         }
@@ -73,10 +74,11 @@ pub(crate) fn check(source: &mut Source<'_>) {
         pictures.iter_mut().for_each(Vec::clear);
         draw(source, size, pictures);
         let mut spans = sides.map(|(first, last)| ValidSpan::from(first..size.0 - last));
-        // A picture of which nothing is valid, on one side.
-        match source.byte() {
-            254 => spans[0] = ValidSpan::from(0..0),
-            255 => spans[1] = ValidSpan::from(9..9),
+        // A picture of which hardly anything is valid, on one side: less than a window, or nothing.
+        match source.below(8) {
+            5 => spans[0] = ValidSpan::from(30..33),
+            6 => spans[1] = ValidSpan::from(30..33),
+            7 => spans[1] = ValidSpan::from(9..9),
             _ => {}
         }
         for (matcher, found) in [plain, other].into_iter().zip(&mut *found) {

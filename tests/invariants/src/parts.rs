@@ -1,5 +1,5 @@
 //! Parts that a detector uses in one way alone, used in others: maps and planes of any pair side by side, a map of a picture that its
-//! surfaces are not of, planes that no ground has, messages whose checksum is right and nothing else, and the longest of scans.
+//! surfaces are not of, planes that no ground has, messages whose checksum is right and nothing else, signals anywhere, and the longest of scans.
 
 use fencepost_core::{
     disparity::DisparityPicture,
@@ -9,7 +9,7 @@ use fencepost_core::{
     map::{Cell, CellState, MapBuilder, MapGeometry, Merged, ObstacleMap, SectorDistances, UnknownReason, View},
     surfaces::Surfaces,
     wire::{
-        Address, BaseId, EndRepr, Frame, FrameFormat, Message, NodeId, Packet, PacketError, Scan, ScanEncoder,
+        Address, BaseId, EndRepr, Frame, FrameFormat, Message, NodeId, Packet, PacketError, Scan, ScanEncoder, Signal,
         WireConfig, WireSettings,
     },
 };
@@ -141,6 +141,13 @@ fn check_messages(source: &mut Source<'_>) {
         (true, true) => None,
     };
     assert_eq!(found.err(), expected, "{data:?}");
+
+    // A signal anywhere in the bytes keeps its value.
+    let size = 1 + source.below(24) as u8;
+    let signal = Signal::new(source.below(65 - usize::from(size)) as u8, size);
+    let (value, mut bytes) = (source.double_word(), [source.byte(); 8]);
+    signal.put(&mut bytes, value);
+    assert_eq!(signal.get(&bytes), value.min(signal.max()), "{signal:?}");
 
     let mut end = [0; 8];
     end.iter_mut().for_each(|byte| *byte = source.one_of(&[0, 1, 0xF0, 0xFF, 0x5A]));
