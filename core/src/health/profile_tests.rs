@@ -135,3 +135,14 @@ fn likeness_is_a_correlation_half_bands_apart() {
         assert_eq!((a.likeness(&Signature::NONE, 0), Signature::NONE.likeness(&a, 1)), (0.0, 0.0));
     }
 }
+
+#[test]
+fn rows_below_the_picture_count_for_nothing() {
+    let mut random = Random::seeded("profiles", 0x5eed_0196);
+    let rows = rows(&mut random, 30, 300);
+    let (expected, mut found) = (profile(&rows), profile(&rows));
+    for y in [BANDS * Profile::rows_of_band(300), 1_000_000, usize::MAX] {
+        found.push(y, &rows[0].0, ValidSpan { start: 0, end: 30 });
+    }
+    assert_eq!((found.grey, found.contrast), (expected.grey, expected.contrast));
+}

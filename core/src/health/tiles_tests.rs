@@ -145,3 +145,14 @@ fn a_tile_is_covered_if_the_other_has_more_than_three_times_its_structure() {
         assert_eq!((found.covered, found.judged), (covered, 1), "{mine} and {theirs} sixteenths");
     }
 }
+
+#[test]
+fn rows_below_the_picture_count_for_nothing() {
+    let mut random = Random::seeded("tiles", 0x5eed_0197);
+    let shown = Shown::random(&mut random, 100, 80);
+    let (expected, mut found) = (shown.tiles(), shown.tiles());
+    for y in 400_000..400_008 {
+        found.push(y, &shown.rows[0].0, ValidSpan { start: 0, end: 100 });
+    }
+    assert_eq!((found.steps, found.counts), (expected.steps, expected.counts));
+}

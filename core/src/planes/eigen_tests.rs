@@ -292,3 +292,9 @@ fn nothing_has_no_direction() {
     assert_eq!(unit([0.0, -0.0, 0.0]), None);
     assert_eq!(unit([0.0, -3.0, 4.0]), Some([0.0, -0.6, 0.8]));
 }
+
+#[test]
+fn what_has_no_length_has_no_direction() {
+    assert_eq!(unit([0.0; 3]), None);
+    assert_eq!(unit([0.0, -2.0, 0.0]), Some([0.0, -1.0, 0.0]));
+}

@@ -1,5 +1,6 @@
 //! The stage against plain versions and known planes.
 
+mod bands;
 mod classes;
 mod labels;
 mod regions;

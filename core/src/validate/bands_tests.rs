@@ -37,3 +37,18 @@ fn what_is_known_to_be_large_is_not_walked_over_at_a_seam() {
     assert_eq!(walked(&["........a", "a........"], 0, None), (1, 1), "the last pixel of the row");
     assert_eq!(walked(&["a........", "........."], 0, None), (1, 1), "no disparity is not walked over");
 }
+
+/// In bands as well nothing is taken out by a stage that is not configured, or for which every surface is large enough.
+#[test]
+fn without_a_size_nothing_is_taken_out_in_bands() {
+    let before: Vec<_> = (0..40 * 64).map(|i| DisparityPixel::from_steps(1 + i % 7 * 90)).collect();
+    let [mut stage, mut other] = [0; 2].map(|_| Box::new(SurfaceSize::<64>::new()));
+    for min_surface_px in [None, Some(0), Some(1), Some(2)] {
+        if let Some(min_surface_px) = min_surface_px {
+            stage.configure(&ValidateSettings { min_surface_px, step_sixteenths: 8 }, 64).unwrap();
+        }
+        let mut picture = before.clone();
+        stage.run_in_bands(&mut picture, &mut [&mut other], &mut crate::bands::OneThread);
+        assert_eq!(picture == before, min_surface_px != Some(2), "{min_surface_px:?}");
+    }
+}

@@ -318,3 +318,14 @@ fn support_and_scatter_are_those_of_the_pixels_near_the_plane() {
         assert!((moved.camera_height_m - found.camera_height_m).abs() < 1.0e-4);
     }
 }
+
+#[test]
+fn without_a_pair_nothing_is_promised_and_no_pixel_gets_a_class() {
+    let (detector, world) = (GroundDeviation::new(), World::level(1.0, 10.0, 0.0));
+    assert!(detector.of_mount().is_none());
+    let promised = configured(&world).of_mount().expect("a pair on a mount");
+    let pixels = world.render();
+    let mut codes = vec![9; pixels.len()];
+    detector.classify(DisparityPicture::new(&pixels, 320), &promised, &mut codes);
+    assert!(codes.iter().all(|code| *code == 9));
+}

@@ -348,3 +348,12 @@ fn classes_of_some_pixels_are_those_of_planes_fitted_around_them() {
     }
     assert!(counts[1..].iter().all(|&pixels| pixels > 10), "{counts:?}");
 }
+
+#[test]
+fn a_plane_without_a_direction_has_no_class() {
+    let world = World::level(1.0, 10.0, 0.0);
+    let detector = Box::new(PixelNormals::<320>::new());
+    for at in [(0.0, 0.0), (160.0, 120.0)] {
+        assert_eq!(detector.class(&DisparityPlane::default(), &world.pair, &world.frame(), at), NONE);
+    }
+}

@@ -73,3 +73,15 @@ fn sums_are_those_of_all_points() {
         assert!(near, "{count} points: {told}, not {truth}");
     }
 }
+
+#[test]
+fn of_no_points_and_of_whole_runs_all_that_is_known_is_told() {
+    let mut sums = PointSums::default();
+    assert_eq!(sums.scatter(), Scatter::default());
+    for count in 1..=3 * RUN {
+        sums.add([count as f32, 2.0, -1.0]);
+        let (found, mean) = (sums.scatter(), 0.5 * (count + 1) as f32);
+        assert_eq!(found.weight, count as f32);
+        assert!((found.mean_m[0] - mean).abs() < 1.0e-4 && found.mean_m[1..] == [2.0, -1.0], "{count}: {found:?}");
+    }
+}

@@ -107,3 +107,12 @@ fn join<const SURFACES: usize>(
         places.iter().map(|place| place.filter(|&place| classes[place]).and_then(|place| region_of[place])).collect();
     (len, places, partition)
 }
+
+#[test]
+fn below_the_picture_there_is_no_tile() {
+    let pixels = vec![DisparityPixel::from_steps(300); 64 * 64];
+    let mut stage = Box::new(Surfaces::<{ 64 * 64 }, 64>::new());
+    stage.configure(&SurfaceSettings::default(), 64, 64).unwrap();
+    stage.run(DisparityPicture::new(&pixels, 64), &depth(), &rays());
+    assert_eq!([(0, 0), (63, 63), (0, 64), (32, 1000)].map(|(x, y)| stage.of_tile(x, y).len()), [1, 1, 0, 0]);
+}
