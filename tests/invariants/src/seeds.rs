@@ -27,7 +27,7 @@ fn rare(name: &str, state: &mut u64) -> Vec<Vec<u8>> {
         loop {
             let seed: Vec<u8> = begin.iter().copied().chain((0..length).map(|_| next(state) as u8)).collect();
             let mut source = Source::new(&seed);
-            if chosen.iter().fold(true, |all, many| source.seldom(*many) && all) {
+            if chosen.iter().all(|many| source.seldom(*many)) {
                 return seeds.push(seed);
             }
         }
