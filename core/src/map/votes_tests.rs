@@ -71,3 +71,47 @@ fn pixels_beyond_the_largest_map_count_nowhere() {
     let last = evidence.last().unwrap();
     assert_eq!((last.obstacle, last.ground, last.unclear, last.height_dm), (0, 0, 0, 0));
 }
+
+#[test]
+fn heights_are_the_less_certain_the_faster_the_ray_drops_towards_the_ground() {
+    let (stages, pixels) = stages();
+    let settings = MapSettings { height_noise_px: 0.8, ..MapSettings::default() };
+    let Stages { surfaces, frame, place, rays, depth, ground, .. } = &stages;
+    let pair = &crate::test_world::PAIR;
+    // Two surfaces side by side, seen along normals that are far from upright, and pixels of none between them.
+    let across = [[0.25_f32, -0.5, 0.5], [-0.125, 0.25, 2.0]];
+    let roles = [Role::Ground, Role::Obstacle];
+    let mut common = [Common::UNSET; MAX_TILE_SURFACES];
+    for (common, (across, role)) in common.iter_mut().zip(across.into_iter().zip(roles)) {
+        *common = Common { role, across };
+    }
+    let collect = Collect {
+        settings: &settings,
+        obstacle_heights_m: (0.25, 2.5),
+        evidence: &mut [],
+        common: &mut common,
+        surfaces,
+        picture: DisparityPicture::new(&pixels, 320),
+        view: &View { pair, frame, place, rays, depth, nearest_m: 0.5 },
+        ground: ground.terrain(),
+        rows: TileRows::ALL,
+    };
+    let labels: [u8; TILE] = core::array::from_fn(|x| [1, 0, 2, 1][x / 8]);
+    let ray = |x: usize| [1.0 + x as f32 / 64.0, 0.5 - x as f32 / 32.0, -0.25 + x as f32 / 128.0];
+    let mut row = Row { rays: [[0.0; TILE]; 4], camera_height_m: 1.2 };
+    for (i, rays) in row.rays.iter_mut().take(3).enumerate() {
+        *rays = core::array::from_fn(|x| ray(x)[i]);
+    }
+    let mut noise_per_m2 = [0.0; TILE];
+    let found = collect.spread(&labels, &row, &mut noise_per_m2);
+    let bits = |label: u8| (0..TILE).filter(|&x| labels[x] == label).fold(0_u32, |bits, x| bits | 1 << x);
+    assert_eq!([found.any, found.ground, found.obstacle], [bits(1) | bits(2), bits(1), bits(2)]);
+    for (x, label) in labels.iter().enumerate().filter(|(_, label)| **label > 0) {
+        // That of the first pixel of the run.
+        let normal = across[usize::from(*label) - 1];
+        let drop: f64 = ray(x / 8 * 8).iter().zip(normal).map(|(r, n)| f64::from(*r) * f64::from(n)).sum();
+        let expected = f64::from(settings.height_noise_px) * drop.abs() / f64::from(pair.focal_px * pair.baseline_m);
+        let found = f64::from(noise_per_m2[x]);
+        assert!((found - expected).abs() < 1.0e-6 * expected, "{x}: {found}, not {expected}");
+    }
+}
