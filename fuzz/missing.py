@@ -25,6 +25,9 @@ sums = collections.Counter()
 others = []
 for ((path, name), row, column), sides in sorted(reached.items()):
     text = open(path).read().split("\n")
+    # Tests at the end of a file are no part of what is to be reached.
+    if "mod tests {" in text[:row]:
+        continue
     for side in (0, 1):
         sums["all"] += 1
         if name.startswith("wire/"):
