@@ -101,3 +101,16 @@ fn the_model_ends_where_it_cannot_be_believed() {
     assert!(!tangential(-0.166_64) && !tangential(-0.3), "folded");
     assert!(!tangential(-1.0), "turned over");
 }
+
+/// Coefficients that no calibration may have: what is told is a number, or nothing is.
+#[test]
+fn what_grows_beyond_all_numbers_is_no_image() {
+    let any_radius = |coefficients| Lens { coefficients, max_radius_squared: f32::INFINITY };
+    let grows = any_radius([f32::MAX, f32::MAX, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert!(grows.radial(2.0).is_none(), "the factor is too large");
+    assert!(grows.radial(0.1).is_none(), "its slope is");
+    assert!(grows.image([0.1, 0.3]).is_none());
+    let steep = any_radius([1.0e25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert!(steep.radial(1.0).is_some());
+    assert!(steep.image([1.0, 0.0]).is_none(), "a determinant of 3e50");
+}

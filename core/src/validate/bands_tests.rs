@@ -52,3 +52,14 @@ fn without_a_size_nothing_is_taken_out_in_bands() {
         assert_eq!(picture == before, min_surface_px != Some(2), "{min_surface_px:?}");
     }
 }
+
+/// Nor is it in a picture without columns, which no size of a surface divides.
+#[test]
+fn a_picture_without_columns_is_left_alone_in_bands() {
+    let [mut stage, mut other] = [0; 2].map(|_| Box::new(SurfaceSize::<64>::new()));
+    stage.configure(&ValidateSettings { min_surface_px: 8, step_sixteenths: 8 }, 0).unwrap();
+    let before = [DisparityPixel::from_steps(90); 3];
+    let mut picture = before;
+    stage.run_in_bands(&mut picture, &mut [&mut other], &mut crate::bands::OneThread);
+    assert_eq!(picture, before);
+}

@@ -142,3 +142,7 @@ fn exchange(heap: &mut [Run], a: usize, b: usize) {
         heap.swap(a, b);
     }
 }
+
+#[cfg(test)]
+#[path = "select_tests.rs"]
+mod tests;

@@ -277,3 +277,13 @@ fn numbers_of_a_column_come_back_from_where_its_votes_will_lie() {
         assert_eq!(Column::of(&slot), column);
     }
 }
+
+/// Before it is configured no column has to be flat, and none is.
+#[test]
+fn a_cost_map_without_settings_finds_no_plane() {
+    let Made { pixels, stages, mut map, .. } =
+        Made::new(&World::level(1.2, 12.0, 2.0), 0.0, &mut Random::seeded("no noise", 0));
+    let Stages { frame, place, rays, depth, .. } = &stages;
+    let view = View { pair: &PAIR, frame, place, rays, depth, nearest_m: 0.0 };
+    assert_eq!(CostMap::new().ground(DisparityPicture::new(&pixels, 320), &view, &mut map), None);
+}

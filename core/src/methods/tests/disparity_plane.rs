@@ -172,3 +172,9 @@ fn disparities_of_a_plane_are_those_of_the_points_that_rays_meet() {
     let at_infinity = DisparityPlane::default();
     assert_eq!(at_infinity.in_world(&PAIR, &World::level(1.0, 0.0, 0.0).frame(), (160.0, 120.0)), None);
 }
+
+#[test]
+fn a_plane_beyond_all_numbers_is_none_in_the_world() {
+    let plane = DisparityPlane { at: 1.0, along_u: f32::MAX, along_v: 0.0 };
+    assert_eq!(plane.in_world(&PAIR, &World::level(1.0, 0.0, 0.0).frame(), (160.0, 120.0)), None);
+}

@@ -357,3 +357,23 @@ fn a_plane_without_a_direction_has_no_class() {
         assert_eq!(detector.class(&DisparityPlane::default(), &world.pair, &world.frame(), at), NONE);
     }
 }
+
+/// A class goes from pixel to pixel where both have disparities that are near to each other, and nowhere else.
+#[test]
+fn classes_are_adopted_along_contiguous_disparities_alone() {
+    let mut detector = Box::new(PixelNormals::<320>::new());
+    detector.configure(&PixelNormalSettings::default(), &SurfaceSettings::default(), 320).unwrap();
+    let near = 320;
+    let far = near + detector.step_sixteenths + 1;
+    let adopted = |left: u16, right: u16| {
+        let of = |steps| {
+            if steps == 0 { DisparityPixel::none(Reason::NotUnique) } else { DisparityPixel::from_steps(steps) }
+        };
+        let pixels = [of(left), of(right)];
+        let mut codes = [2, NONE];
+        detector.adopt(DisparityPicture::new(&pixels, 2), &|pixel| pixel.steps(), &mut codes);
+        codes[1] == 2
+    };
+    let found = [(near, near), (near, far), (0, near), (near, 0), (0, 0)].map(|(left, right)| adopted(left, right));
+    assert_eq!(found, [true, false, false, false, false]);
+}
