@@ -173,7 +173,7 @@ impl Schedule {
 
     /// Whether frames may be held up or lost.
     fn spoils_the_bus(&self) -> bool {
-        self.orders.iter().any(|[order, _]| (13..=20).contains(&(order % 32)))
+        self.orders.iter().any(|[order, _]| matches!(order % 32, 13..=18 | 20))
     }
 }
 
