@@ -31,16 +31,16 @@ fn plain(input: &RandomPicture, places: &[Option<usize>], takes_part: &[bool]) -
     (0..pixels.len()).map(|at| takes_part(at).then(|| root(&parent, at))).collect()
 }
 
-#[test]
-fn joining_tiles_equals_union_find_over_all_pixels() {
-    let mut random = Random::seeded("joined surfaces", 0x5eed_0103);
+/// The number of surfaces, and how many of them were joined to another.
+fn check(seed: u64, rounds: usize) -> (usize, usize) {
+    let mut random = Random::seeded("joined surfaces", seed);
     let (depth, rays) = (depth(), rays());
     let mut stage = Box::new(Surfaces::<{ WIDTH * HEIGHT }, 1024>::new());
     let mut small = Box::new(Surfaces::<{ WIDTH * HEIGHT }, 24>::new());
     let mut regions = Box::new(Regions::<1024>::new());
     let mut small_regions = Box::new(Regions::<24>::new());
     let (mut surfaces, mut joins) = (0, 0);
-    for round in 0..10_000 {
+    for round in 0..rounds {
         let input = RandomPicture::new(&mut random);
         let all = random.below(3) == 0;
         let classes: Vec<bool> = (0..1024).map(|_| all || random.below(4) > 0).collect();
@@ -65,7 +65,20 @@ fn joining_tiles_equals_union_find_over_all_pixels() {
         joins += classes[..table].iter().filter(|&&part| part).count() - labels.len();
     }
     std::println!("{surfaces} surfaces, {joins} of them joined to another");
-    assert!(surfaces > 30_000 && joins > 5_000, "{surfaces} surfaces, {joins} joined");
+    (surfaces, joins)
+}
+
+#[test]
+fn joining_tiles_equals_union_find_over_all_pixels() {
+    let (surfaces, joins) = check(0x5eed_0103, 10_000);
+    assert!(surfaces > 30_000 && joins > 5_000);
+}
+
+/// The same, so quick that it is among the first that a mistake meets.
+#[test]
+fn a_few_pictures_are_joined_as_union_find_joins_them() {
+    let (surfaces, joins) = check(0x5eed_0109, 40);
+    assert!(surfaces > 100 && joins > 10);
 }
 
 /// Labels by region of the pixels whose surfaces take part; the number of surfaces and the place of each pixel's.
