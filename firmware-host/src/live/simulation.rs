@@ -71,6 +71,7 @@ pub fn simulate<C: Camera, B: CanBus, S: Sight>(
     }
     let after = |wait: Duration| clock.now_ns().saturating_add(u64::try_from(wait.as_nanos()).unwrap_or(u64::MAX));
     let mut due_ns: Vec<Option<u64>> = (0..running.len()).map(|index| Some(after(pace(index)))).collect();
+    let mut tell = || std::iter::from_fn(|| events.next()).for_each(|event| observe(&event));
 
     bus.begin();
     let mut bus_due_ns = clock.now_ns();
@@ -92,14 +93,10 @@ pub fn simulate<C: Camera, B: CanBus, S: Sight>(
                 }
             }
         }
-        while let Some(event) = events.next() {
-            observe(&event);
-        }
+        tell();
     }
     let bus = bus.end();
-    while let Some(event) = events.next() {
-        observe(&event);
-    }
+    tell();
     let pairs = running.into_iter().map(|(pair, _)| pair.end()).collect();
     Ok(RunReport { pairs, bus, events_dropped: events.dropped() })
 }
