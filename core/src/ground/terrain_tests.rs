@@ -1,13 +1,14 @@
 //! Terrain against the ground that a perfect camera sees in steps of 1/16 px.
 
-use std::vec::Vec;
+use std::{boxed::Box, vec::Vec};
 
 use super::*;
 use crate::{
-    disparity::Reason,
+    disparity::{DisparityPixel, Reason},
     geometry::{Mount, VehicleFrame},
     ground::GroundSettings,
     obstacles::ObstacleSettings,
+    surfaces::SurfaceSettings,
     test_random::Random,
     test_world::{Patch, Stages, World, ground},
 };
@@ -373,5 +374,30 @@ fn what_stands_upright_says_nothing_of_the_ground() {
         (SurfaceClass::Undefined, Says::MayBeGround),
     ] {
         assert!(Says::of(class) == says, "{class:?}");
+    }
+}
+
+#[test]
+fn each_surface_of_a_tile_is_asked() {
+    // 64 blocks of 4 x 4 pixels, all unlike their neighbours: a tile holds no more.
+    let alternate = |i: usize| if (i % 32 / 4 + i / 32 / 4).is_multiple_of(2) { 100 } else { 500 };
+    let pixels: Vec<_> = (0..32 * 32).map(|i| DisparityPixel::from_steps(alternate(i))).collect();
+    let picture = DisparityPicture::new(&pixels, 32);
+    let world = World::empty(1.2, 12.0, 0.0);
+    let Stages { depth, rays, .. } =
+        Stages::new(&world.mount(), &GroundSettings::default(), &ObstacleSettings::default());
+    let mut surfaces = Box::new(Surfaces::<{ 32 * 32 }, MAX_TILE_SURFACES>::new());
+    surfaces.configure(&SurfaceSettings { min_pixels: 16, ..SurfaceSettings::default() }, 32, 32).unwrap();
+    assert_eq!(surfaces.run(picture, &depth, &rays).found, 64);
+    let bend = Bend { tolerance_m: 100.0, ..BEND };
+    for ground in 0..64 {
+        for (k, surface) in surfaces.table_mut().iter_mut().enumerate() {
+            surface.class = if k == ground { SurfaceClass::Ground } else { SurfaceClass::Vertical };
+        }
+        let mut terrain = known(&[]);
+        let (depth, rays, bend) = (&depth, &rays, &bend);
+        Gather { terrain: &mut terrain, round: Round::Trim, surfaces: &surfaces, picture, depth, rays, bend }.run();
+        // Of the columns one in four is looked at, of the rows one in two.
+        assert_eq!(terrain.weight.as_flattened().iter().sum::<f32>(), 2.0, "{ground}");
     }
 }
