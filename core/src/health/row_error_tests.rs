@@ -256,3 +256,23 @@ fn near_is_what_fits_more_than_twice_as_well() {
         assert_eq!(near(within, nearer, &mut random), (expected, 1), "{within} within the range, {nearer} beyond");
     }
 }
+
+#[test]
+fn a_row_is_told_if_two_rows_off_the_patch_fits_worse_by_two_grey_values_for_each_pixel() {
+    // Rows of one grey value each, alike in both pictures, brighter from the middle one on and from the third one below it. Two rows
+    // higher the seven columns of a patch differ twice by the first step and once by the second; two rows lower twice by each.
+    let told = |middle: u8, third: u8, upside_down: bool| {
+        let grey = |y: u8| 50 + if y >= 7 { middle } else { 0 } + if y >= 10 { third } else { 0 };
+        let rows: Vec<Vec<u8>> = (0..15).map(|y| vec![grey(if upside_down { 14 - y } else { y }); 40]).collect();
+        let whole = ValidSpan { start: 0, end: 40 };
+        let rows = Rows { left: rows.clone(), right: rows, spans: [whole; 2], pixels: vec![] };
+        let found = row_error(Chosen::PLAIN, &rows.strip(), 20, 5);
+        assert_eq!(found, rows.error(20, 5));
+        found.is_some()
+    };
+    for upside_down in [false, true] {
+        for (middle, third, expected) in [(7, 0, true), (6, 2, true), (6, 1, false), (6, 0, false)] {
+            assert_eq!(told(middle, third, upside_down), expected, "{middle} and {third}, {upside_down}");
+        }
+    }
+}
