@@ -31,12 +31,12 @@ pub const fn classic_frame_bits(data_bytes: u32) -> u32 {
 /// switch its bit rate: an upper bound of the time that any other takes.
 ///
 /// 22 bits before the data, stuffed with them; then, by ISO 11898-1:2015, the stuff count of 4 bits and the CRC of 21 with a
-/// fixed stuff bit before them and after each four; then delimiters, acknowledge, end of frame and intermission, 13 bits.
+/// fixed stuff bit before each four of them; then delimiters, acknowledge, end of frame and intermission, 13 bits.
 pub const fn fd_frame_bits(data_bytes: u32) -> u32 {
     let stuffed = 22 + 8 * data_bytes;
     let stuff_bits = (stuffed - 1) / 4;
-    let check = 4 + 21;
-    let fixed_stuff_bits = 1 + (check - 1) / 4;
+    let check = 4 + 21_u32;
+    let fixed_stuff_bits = check.div_ceil(4);
     stuffed + stuff_bits + check + fixed_stuff_bits + 13
 }
 
@@ -66,7 +66,10 @@ pub const fn max_bits_per_second(config: &WireConfig, scan_rate_hz: u16) -> u32 
 pub const fn max_load_permille(config: &WireConfig, bitrate: u32, scan_rate_hz: u16) -> u32 {
     let bits = max_bits_per_second(config, scan_rate_hz) as u64 * 1000;
     let permille = bits.div_ceil(if bitrate == 0 { 1 } else { bitrate as u64 });
-    if permille > u32::MAX as u64 { u32::MAX } else { permille as u32 }
+    match permille {
+        0..=0xffff_ffff => permille as u32,
+        _ => u32::MAX,
+    }
 }
 
 const fn checked(settings: WireSettings) -> WireConfig {
