@@ -172,6 +172,9 @@ mod tests {
         check(size_of::<Detector<{ 320 * 240 }, 320, 48, { SMALL.grid }, { SMALL.surfaces }, 64, 2500>>(), SMALL);
         check(size_of::<Detector<{ 512 * 384 }, 512, 64, { LAGR.grid }, { LAGR.surfaces }, 64, 2500>>(), LAGR);
         check(size_of::<Detector<{ 1242 * 375 }, 1242, 128, { LARGE.grid }, { LARGE.surfaces }, 64, 2500>>(), LARGE);
+        // Those that do not come with the size of the pictures.
+        const OTHER: Capacities = Capacities { surfaces: 100, obstacles: 300, cells: 640, ..SMALL };
+        check(size_of::<Detector<{ 320 * 240 }, 320, 48, { SMALL.grid }, 100, 300, 640>>(), OTHER);
         for (name, capacities) in [("320 x 240 x 48", SMALL), ("512 x 384 x 64", LAGR), ("1242 x 375 x 128", LARGE)] {
             std::println!("{name}: {} bytes", memory_bytes(&capacities));
         }
