@@ -200,6 +200,14 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_sizes_that_all_others_are_told_by_are_told_to_the_byte() {
+        let least =
+            Capacities { pixels: 1024, width: 64, disparities: 16, grid: 64, surfaces: 64, obstacles: 64, cells: 64 };
+        assert_eq!(memory_bytes(&least), size_of::<Detector<1024, 64, 16, 64, 64, 64, 64>>());
+        assert_eq!(band_bytes(&least), size_of::<Band<64, 16, 64>>());
+    }
+
     /// What an integrator plans with: a change of these shows up in review.
     #[test]
     fn sizes_are_those_that_were_agreed() {
