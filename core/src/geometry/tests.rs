@@ -47,7 +47,8 @@ fn a_camera_that_leans_to_the_right_has_its_right_side_low() {
 }
 
 #[test]
-fn a_mount_without_a_height_stands_at_the_assumed_one() {
+fn the_camera_stands_at_the_height_of_the_mount_or_at_the_assumed_one() {
+    assert_eq!(frame(0.625, 12.0, 3.0).camera_height_m(), 0.625);
     let mount = Mount::default();
     assert_eq!(VehicleFrame::new(&mount).unwrap().camera_height_m(), Mount::ASSUMED_HEIGHT_M);
 }
@@ -170,8 +171,10 @@ fn distances_are_those_of_the_formula_for_every_step() {
                 continue;
             }
             let truth = scale / disparity;
+            let unit = f64::from(table.scale_m());
+            assert!((f64::from(table.inverse(steps)) * unit - found).abs() <= found * 1.0e-6, "{steps}, {pair:?}");
             // Half a unit of the inverse.
-            let tolerance = f64::from(table.scale_m()) * 0.5 + truth * 2.0e-5;
+            let tolerance = 0.5 * unit + truth * 2.0e-5;
             assert!((found - truth).abs() <= tolerance, "{steps}: {found} instead of {truth}, {pair:?}");
         }
     }
