@@ -35,10 +35,7 @@ impl HeaderRepr {
     /// Steps of an age in nanoseconds: never younger than it is.
     pub const fn age_steps(age_ns: u64) -> u8 {
         let steps = age_ns.div_ceil(AGE_STEP_MS as u64 * 1_000_000);
-        match steps {
-            0..=255 => steps as u8,
-            _ => 255,
-        }
+        if steps > 255 { 255 } else { steps as u8 }
     }
 
     /// The age in nanoseconds; `None` if it is only known to be 1275 ms or more.
