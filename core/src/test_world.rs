@@ -200,6 +200,12 @@ pub(crate) fn ground(height_m: f64) -> Patch {
     Patch::new([0.0, 0.0, height_m], [1000.0, 0.0, 0.0], [0.0, 1000.0, 0.0])
 }
 
+/// A tile with as many surfaces as it can hold, row by row: 64 blocks of 4 x 4 pixels, all unlike their neighbours.
+pub(crate) fn tile_of_blocks() -> Vec<DisparityPixel> {
+    let steps = |i: usize| if (i % 32 / 4 + i / 32 / 4).is_multiple_of(2) { 100 } else { 500 };
+    (0..32 * 32).map(|i| DisparityPixel::from_steps(steps(i))).collect()
+}
+
 /// The stages from the surfaces to the obstacles, for pictures of [`PAIR`].
 pub(crate) struct Stages {
     pub(crate) surfaces: Box<Surfaces<{ 320 * 240 }, 1024>>,

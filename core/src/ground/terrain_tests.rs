@@ -4,13 +4,13 @@ use std::{boxed::Box, vec::Vec};
 
 use super::*;
 use crate::{
-    disparity::{DisparityPixel, Reason},
+    disparity::Reason,
     geometry::{Mount, VehicleFrame},
     ground::GroundSettings,
     obstacles::ObstacleSettings,
     surfaces::SurfaceSettings,
     test_random::Random,
-    test_world::{Patch, Stages, World, ground},
+    test_world::{Patch, Stages, World, ground, tile_of_blocks},
 };
 
 /// How the ground rises: distance ahead and height, metres, with straight ground between.
@@ -379,9 +379,7 @@ fn what_stands_upright_says_nothing_of_the_ground() {
 
 #[test]
 fn each_surface_of_a_tile_is_asked() {
-    // 64 blocks of 4 x 4 pixels, all unlike their neighbours: a tile holds no more.
-    let alternate = |i: usize| if (i % 32 / 4 + i / 32 / 4).is_multiple_of(2) { 100 } else { 500 };
-    let pixels: Vec<_> = (0..32 * 32).map(|i| DisparityPixel::from_steps(alternate(i))).collect();
+    let pixels = tile_of_blocks();
     let picture = DisparityPicture::new(&pixels, 32);
     let world = World::empty(1.2, 12.0, 0.0);
     let Stages { depth, rays, .. } =

@@ -9,7 +9,7 @@ mod sums;
 use std::{boxed::Box, collections::HashMap, vec, vec::Vec};
 
 use super::*;
-use crate::{disparity::Reason, geometry::RectifiedPair, test_random::Random};
+use crate::{disparity::Reason, geometry::RectifiedPair, test_random::Random, test_world::tile_of_blocks};
 
 /// Largest picture of the random tests.
 const WIDTH: usize = 100;

@@ -183,10 +183,7 @@ fn a_full_table_loses_the_smallest_and_says_how_many() {
 
 #[test]
 fn a_tile_holds_the_most_surfaces_possible() {
-    // 64 blocks of 4 x 4 pixels, all unlike their neighbours.
-    let pixels: Vec<_> = (0..32 * 32_usize)
-        .map(|i| DisparityPixel::from_steps(if (i % 32 / 4 + i / 32 / 4) % 2 == 0 { 100 } else { 500 }))
-        .collect();
+    let pixels = tile_of_blocks();
     let mut stage = Box::new(Surfaces::<1024, 64>::new());
     let settings = SurfaceSettings { min_pixels: 16, ..SurfaceSettings::default() };
     stage.configure(&settings, 32, 32).unwrap();
@@ -204,8 +201,7 @@ fn a_tile_of_coded_pixels_holds_one_surface_less_and_counts_it() {
     // Those of the test above; beside two bits of a class there are six for a number.
     let block = |i: usize| i / 32 / 4 * 8 + i % 32 / 4;
     let code = |i: usize| (1 + block(i) % (CODES - 1)) as u8;
-    let alternate = |i: usize| if (i % 32 / 4 + i / 32 / 4).is_multiple_of(2) { 100 } else { 500 };
-    let pixels: Vec<_> = (0..32 * 32).map(|i| DisparityPixel::from_steps(alternate(i))).collect();
+    let pixels = tile_of_blocks();
     let classes = [SurfaceClass::Undefined, SurfaceClass::Ground, SurfaceClass::Slanted, SurfaceClass::Obstacle];
     let mut stage = Box::new(Surfaces::<1024, 64>::new());
     stage.configure(&SurfaceSettings { min_pixels: 16, ..SurfaceSettings::default() }, 32, 32).unwrap();
